@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from clrt.device.open import Device
 
 #: Folder → the group of its tests (see setup.cfg).
-FOLDERS = {"farm": "farm", "oracle": "statistics", "study": "study", "window": "window"}
+FOLDERS = {"farm": "farm", "oracle": "statistics", "bench": "study", "window": "window"}
 #: Limit on PoCL's cache of compiled programs between runs; one run of all tests adds about 200 MB.
 MOST_KEPT_BYTES = 500_000_000
 #: Variables that control terminal output. Tests set them themselves, regardless of the machine's environment.

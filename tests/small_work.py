@@ -20,7 +20,7 @@ from clrt.output.aov_files import layered
 from clrt.queries.base import TRAVERSALS
 from clrt.rendering.accumulation.denoiser_guides import render_guides
 from clrt.rendering.accumulation.first_hits import first_hits
-from clrt.rendering.accumulation.single_device import Session
+from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.aovs import AOVS, film_aovs
 from clrt.rendering.compile.choices import OFFSETS
 from clrt.rendering.compile.compile_scene import compile_scene
@@ -50,10 +50,10 @@ def scene() -> Scene:
     return replace(full, meshes=[*(mesh for mesh in full.meshes if mesh.normals is None), *smooth], render=SETTINGS)
 
 
-def started(device: Device, what: Scene, **chosen: Any) -> Session:
+def started(device: Device, what: Scene, **chosen: Any) -> SingleDeviceAccumulation:
     """Return a session ready to render the scene. chosen: see Choices."""
     compiled = compile_scene(what, choices(device, **chosen), device=device)
-    return Session(device, compiled, what.render.size, what.render.max_depth, what.render.seed)
+    return SingleDeviceAccumulation(device, compiled, what.render.size, what.render.max_depth, what.render.seed)
 
 
 def picture(device: Device, what: Scene, **chosen: Any) -> Answers:
@@ -61,7 +61,7 @@ def picture(device: Device, what: Scene, **chosen: Any) -> Answers:
     return {"mean": film(started(device, what, **chosen), what.render.spp).mean}
 
 
-def film(session: Session, spp: int) -> Film:
+def film(session: SingleDeviceAccumulation, spp: int) -> Film:
     """Render and return the film."""
     for _ in session.render(spp):
         pass

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .bvh import BoolArray, FloatArray, Tree
+from .bvh import BoolArray, FloatArray, Bvh
 from .top_down import OpenNodes, grow
 
 Doubles = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-def sah(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, pack: int = 1) -> Tree:
+def sah(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, pack: int = 1) -> Bvh:
     """Build by the surface area heuristic, over all splits of the primitives sorted by centroid on each axis.
 
     Cost of a split (Nadolny 2026, 2.7; Wald 2007, "On fast construction of SAH-based bounding volume hierarchies"):
@@ -26,7 +26,7 @@ def sah(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, pack: int = 
     return grow(aabb_min, aabb_max, leaf_size, min(pack, leaf_size), lambda nodes: sweep.cut(nodes, leaf_size, pack))
 
 
-def midpoint(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int = 2, pack: int = 1) -> Tree:
+def midpoint(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int = 2, pack: int = 1) -> Bvh:
     """Split in the middle of the longest axis of the centroid bounds (Nadolny 2026, 5.4.4).
 
     With centroid bounds, unlike box bounds, both sides are non-empty unless all centroids coincide. There is no cost,
@@ -35,7 +35,7 @@ def midpoint(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int = 2, pac
     return grow(aabb_min, aabb_max, leaf_size, leaf_size, _midpoint_cut)
 
 
-BUILDERS: dict[str, Callable[[FloatArray, FloatArray, int, int], Tree]] = {"sah": sah, "midpoint": midpoint}
+BUILDERS: dict[str, Callable[[FloatArray, FloatArray, int, int], Bvh]] = {"sah": sah, "midpoint": midpoint}
 
 
 def _midpoint_cut(nodes: OpenNodes) -> BoolArray:

@@ -23,7 +23,7 @@ class Triangles(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Tree:
+class Bvh:
     """A binary BVH in flat arrays (Nadolny 2026, 5.4.4). Node 0 is the root; children come after their parent.
 
     A BVH over p primitives has at most 2p − 1 nodes. The empty BVH is one interior node that is its own child and whose
@@ -101,13 +101,13 @@ def expected_work(area: NDArray[np.float64], work: NDArray[Any]) -> float:
     return float(np.sum(area / area[0] * work) if area[0] > 0 else np.sum(work))
 
 
-def empty_tree() -> Tree:
+def empty_tree() -> Bvh:
     """Return the BVH without primitives."""
     nothing, zero, inverted = np.empty(0, np.int32), np.zeros(1, np.int32), np.full((1, 3), np.inf, np.float32)
-    return Tree(inverted, -inverted, zero, zero, np.zeros(1, bool), nothing, nothing)
+    return Bvh(inverted, -inverted, zero, zero, np.zeros(1, bool), nothing, nothing)
 
 
-def join(triangles: Tree, spheres: Tree) -> Tree:
+def join(triangles: Bvh, spheres: Bvh) -> Bvh:
     """Join the BVHs of triangles and spheres under a new root, so that every leaf has one kind only.
 
     Both come from a builder, which fills `order`; the second one's primitives are spheres.
@@ -119,10 +119,10 @@ def join(triangles: Tree, spheres: Tree) -> Tree:
     def merged(root: Any, first: NDArray[Any], second: NDArray[Any]) -> NDArray[Any]:
         return np.concatenate([np.array([root], first.dtype), first[:1], second[:1], first[1:], second[1:]])
 
-    def shifted(tree: Tree, shift: int) -> IntArray:
+    def shifted(tree: Bvh, shift: int) -> IntArray:
         return np.where(tree.leaf, tree.left_first, tree.left_first + np.int32(shift))
 
-    return Tree(
+    return Bvh(
         aabb_min=merged(np.minimum(triangles.aabb_min[0], spheres.aabb_min[0]), triangles.aabb_min, spheres.aabb_min),
         aabb_max=merged(np.maximum(triangles.aabb_max[0], spheres.aabb_max[0]), triangles.aabb_max, spheres.aabb_max),
         left_first=merged(1, shifted(triangles, 2), shifted(spheres, 1 + len(triangles.count))),

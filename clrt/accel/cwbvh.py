@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .bvh import BoolArray, FloatArray, IntArray, Tree
-from .wide import EMPTY, Wide, collapse, leaf_fields
+from .bvh import BoolArray, FloatArray, IntArray, Bvh
+from .wide import EMPTY, WideBvh, collapse, leaf_fields
 
 Bytes = NDArray[np.uint8]
 Records = NDArray[np.void]
@@ -45,7 +45,7 @@ _CORNERS = np.where(np.arange(SLOTS)[:, None] >> np.arange(3) & 1, 1.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Compressed:
+class CompressedBvh:
     """A BVH as records. order, sphere_order: (m,), (s,) int32, the primitives in the records' numbering.
 
     stack: maximum number of node groups on the stack (see stack_bound). wide: the BVH before compression, with its
@@ -56,10 +56,10 @@ class Compressed:
     order: IntArray
     sphere_order: IntArray
     stack: int
-    wide: Wide
+    wide: WideBvh
 
 
-def compress(tree: Tree) -> Compressed:
+def compress(tree: Bvh) -> CompressedBvh:
     """Compress a binary BVH whose leaves have up to MAX_LEAF primitives. Raises SceneError as `collapse` does."""
     wide = in_slots(collapse(tree, SLOTS))
     nodes = np.zeros(len(wide.child), CWBVH_NODE)
@@ -71,7 +71,7 @@ def compress(tree: Tree) -> Compressed:
     nodes["child"] = 1 + np.cumsum(inner) - inner
     nodes["meta"][interior] = (1 << 5 | 24 + np.broadcast_to(slot, interior.shape))[interior]
     order, sphere_order = _number_primitives(wide, nodes)
-    return Compressed(nodes, order, sphere_order, stack_bound(wide), wide)
+    return CompressedBvh(nodes, order, sphere_order, stack_bound(wide), wide)
 
 
 def octant_slots(offset: NDArray[np.float64], used: BoolArray) -> IntArray:
@@ -110,7 +110,7 @@ def quantise(aabb_min: FloatArray, aabb_max: FloatArray) -> tuple[FloatArray, By
     return origin, exponent.astype(np.uint8), lo.astype(np.uint8), hi.astype(np.uint8)
 
 
-def in_slots(wide: Wide) -> Wide:
+def in_slots(wide: WideBvh) -> WideBvh:
     """Return the BVH with every node's children in their octants' slots, and nodes in breadth-first order again."""
     used = wide.child != EMPTY
     low, high = wide.aabb_min.min(axis=1, keepdims=True), wide.aabb_max.max(axis=1, keepdims=True)
@@ -129,7 +129,7 @@ def _doubles(boxes: FloatArray, used: BoolArray) -> NDArray[np.float64]:
     return np.where(used[..., None], boxes.astype(np.float64), 0.0)
 
 
-def stack_bound(wide: Wide) -> int:
+def stack_bound(wide: WideBvh) -> int:
     """Return the maximum number of node groups on the stack of a traversal.
 
     The child nodes of a node that a ray enters are one group, which is on the stack while one of them is visited if
@@ -142,7 +142,7 @@ def stack_bound(wide: Wide) -> int:
     return int(waiting.max())
 
 
-def _number_primitives(wide: Wide, nodes: Records) -> tuple[IntArray, IntArray]:
+def _number_primitives(wide: WideBvh, nodes: Records) -> tuple[IntArray, IntArray]:
     """Fill `primitive`, and `meta` of leaves; return the triangles and the spheres in the order of their numbers."""
     row, slot = np.nonzero(wide.child < 0)
     first, sphere, count = leaf_fields(wide.child[row, slot])

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pyopencl as cl
 
-from ..device.launches.data_parallel import Blocks
+from ..device.launches.data_parallel import DataParallel
 from ..device.open import Device
 from ..device.programs.preamble import defines, typedefs
 from ..device.programs.program import compose
@@ -27,7 +27,7 @@ from .wide import EMPTY, MAX_PRIMITIVES
 
 
 @dataclass(frozen=True)
-class Shape:
+class BuilderLayout:
     """Requirements of a layout on the builder. writer: the kernel file that writes its records, `node` and `leaf`.
 
     children: per node. leaf_size: maximum primitives per leaf. pack: triangles that are intersected at the cost of one.
@@ -53,10 +53,10 @@ WORLD = record(per_side="3f4", per_area="f4", no_side="3f4", no_area="f4")
 LARGEST_ARRAY = 192
 
 SHAPES = {
-    "bvh8": Shape("build/bvh8.cl", LANES, LANES, LANES, BVH8_NODE, TRIANGLE_PACK, "packs"),
-    "bvh2": Shape("build/bvh2.cl", 2, LEAF_SIZES["sah"], 1, BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", (2, 2)),
-    "cwbvh": Shape("build/cwbvh.cl", SLOTS, MAX_LEAF, MAX_LEAF, CWBVH_NODE, LEAF_TRIANGLE, "leaf_triangles",
-                   compressed=True)}
+    "bvh8": BuilderLayout("build/bvh8.cl", LANES, LANES, LANES, BVH8_NODE, TRIANGLE_PACK, "packs"),
+    "bvh2": BuilderLayout("build/bvh2.cl", 2, LEAF_SIZES["sah"], 1, BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", (2, 2)),
+    "cwbvh": BuilderLayout("build/cwbvh.cl", SLOTS, MAX_LEAF, MAX_LEAF, CWBVH_NODE, LEAF_TRIANGLE, "leaf_triangles",
+                           compressed=True)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ def fits(device: Device | None, count: int) -> bool:
     return device is not None and count * LARGEST_ARRAY <= device.info.max_alloc_bytes
 
 
-def build_tree(device: Device, shape: Shape, triangles: Triangles, spheres: FloatArray,
+def build_tree(device: Device, shape: BuilderLayout, triangles: Triangles, spheres: FloatArray,
                reinsertions: int = 0) -> DeviceTree:
     """Build the BVH over at least two primitives: triangles, spheres (s, 4), with finite coordinates below 1e18.
 
@@ -94,7 +94,7 @@ def build_tree(device: Device, shape: Shape, triangles: Triangles, spheres: Floa
         raise NoRoomError(f"building a BVH over {count} primitives needs larger buffers than the "
                           f"{device.info.max_alloc_bytes} bytes that {device.info.name} allows; use the builder sah")
     source = program_source(shape, len(triangles) > 0, len(spheres) > 0, reinsertions > 0)
-    work = Blocks(device, source, count * SHAPE * 4)
+    work = DataParallel(device, source, count * SHAPE * 4)
     primitives = sort_primitives(work, triangles, spheres)
     tree = cluster(work, primitives)
     if reinsertions:
@@ -104,7 +104,7 @@ def build_tree(device: Device, shape: Shape, triangles: Triangles, spheres: Floa
     return _write(work, shape, plan, levels, stack)
 
 
-def program_source(shape: Shape, triangles: bool, spheres: bool, reinsertions: bool) -> str:
+def program_source(shape: BuilderLayout, triangles: bool, spheres: bool, reinsertions: bool) -> str:
     """Return the builder's program, for scenes with triangles, with spheres, and with reinsertion passes."""
     values = {"CHILDREN": shape.children, "LEAF_SIZE": shape.leaf_size, "PACK": shape.pack, "EMPTY": EMPTY,
               "SLOW": SLOW, "LANES": math.prod(shape.leaf["primitive"].shape), "TRIANGLES": int(triangles),
@@ -150,7 +150,7 @@ class _Level:
         return self.slots, self.places, self.waiting
 
 
-def _plan(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree) -> _Plan:
+def _plan(work: DataParallel, shape: BuilderLayout, primitives: Primitives, tree: BinaryTree) -> _Plan:
     """Plan the wide BVH in the rounds of the binary one, as each depends on those before. The last node is the root."""
     root, world = tree.count - 1, np.zeros(1, WORLD)
     top = work.download(tree.nodes, BINARY_NODE, 1, root)
@@ -166,7 +166,7 @@ def _plan(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree) 
     return _Plan(primitives, tree, plans, float(area[0]))
 
 
-def _open(work: Blocks, shape: Shape, plan: _Plan) -> tuple[list[_Level], int]:
+def _open(work: DataParallel, shape: BuilderLayout, plan: _Plan) -> tuple[list[_Level], int]:
     """Return the levels of the wide BVH and its maximum traversal stack size. Starts at a node above the root."""
     slots = np.full(shape.children, EMPTY, np.int32)
     slots[0] = plan.tree.count - 1
@@ -183,7 +183,7 @@ def _open(work: Blocks, shape: Shape, plan: _Plan) -> tuple[list[_Level], int]:
     return levels[1:], int(work.download(most, np.int32, 1)[0])
 
 
-def _write(work: Blocks, shape: Shape, plan: _Plan, levels: list[_Level], stack: int) -> DeviceTree:
+def _write(work: DataParallel, shape: BuilderLayout, plan: _Plan, levels: list[_Level], stack: int) -> DeviceTree:
     """Write nodes and leaves, level by level."""
     sizes, records = [level.count for level in levels], [level.records for level in levels]
     each, besides = shape.records

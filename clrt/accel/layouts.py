@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 
 from ..errors import check_choice
 from .builders import BUILDERS
-from .bvh import FloatArray, IntArray, Tree, join
+from .bvh import FloatArray, IntArray, Bvh, join
 from .cwbvh import MAX_LEAF, compress
 from .grouping import packs_of
-from .wide import Wide, collapse, leaf_fields, leaf_reference
+from .wide import WideBvh, collapse, leaf_fields, leaf_reference
 
 Records = NDArray[np.void]
 
@@ -171,7 +171,7 @@ LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {
     "list": _list, "packs": _packs, "bvh2": _bvh2, "bvh8": _bvh8, "cwbvh": _cwbvh}
 
 
-def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: int, lanes: int) -> Tree:
+def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: int, lanes: int) -> Bvh:
     """Build one BVH over both kinds; triangles are intersected `lanes` at a time, spheres one by one."""
     build = BUILDERS[builder]
     return join(build(*triangle_boxes(triangles), leaf_size, lanes),
@@ -195,13 +195,13 @@ def sphere_boxes(spheres: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.nextafter(low, -far), np.nextafter(high, far)
 
 
-def _level_sizes(tree: Tree | Wide) -> tuple[int, ...]:
+def _level_sizes(tree: Bvh | WideBvh) -> tuple[int, ...]:
     levels = list(tree.levels())
     nodes = np.concatenate(levels)
     return tuple(map(len, levels)) if np.array_equal(nodes, np.arange(len(nodes))) else ()
 
 
-def bvh2_nodes(tree: Tree) -> Records:
+def bvh2_nodes(tree: Bvh) -> Records:
     """Return the nodes of the layout bvh2."""
     links = np.where(tree.leaf, tree.left_first, tree.left_first + (tree.left_first > 0))
     nodes = np.zeros(1 + len(tree.count), BVH2_NODE)
@@ -212,7 +212,7 @@ def bvh2_nodes(tree: Tree) -> Records:
     return nodes
 
 
-def wide_nodes(wide: Wide, child: IntArray) -> Records:
+def wide_nodes(wide: WideBvh, child: IntArray) -> Records:
     """Return the nodes of the layout bvh8 with the boxes of `wide` and references `child` (k, 8)."""
     nodes = np.zeros(len(child), BVH8_NODE)
     nodes["lo"], nodes["hi"] = wide.aabb_min.transpose(0, 2, 1), wide.aabb_max.transpose(0, 2, 1)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyopencl as cl
 
-from ..device.launches.data_parallel import Blocks
+from ..device.launches.data_parallel import DataParallel
 from .bvh import FloatArray, Triangles
 
 CODE_BITS, DIGIT_BITS = 63, 8
@@ -40,7 +40,7 @@ class Primitives:
 Scene = tuple[cl.Buffer, cl.Buffer, int]  # triangles, spheres, and how many triangles there are
 
 
-def sort_primitives(work: Blocks, triangles: Triangles, spheres: FloatArray) -> Primitives:
+def sort_primitives(work: DataParallel, triangles: Triangles, spheres: FloatArray) -> Primitives:
     """Sort triangles and spheres (s, 4), float32, along a Morton curve through the centres of their boxes."""
     count = len(triangles) + len(spheres)
     scene = work.lend(np.asarray(triangles)), work.lend(spheres), len(triangles)
@@ -54,7 +54,7 @@ def sort_primitives(work: Blocks, triangles: Triangles, spheres: FloatArray) -> 
     return Primitives(shapes, ids, len(triangles), count)
 
 
-def _morton_order(work: Blocks, scene: Scene, count: int) -> cl.Buffer:
+def _morton_order(work: DataParallel, scene: Scene, count: int) -> cl.Buffer:
     """Return the primitives' numbers in Morton order, (count,) uint32."""
     low, extent = _centre_bounds(work, scene, count)
     scale = min(CELLS / extent, float(np.finfo(np.float32).max)) if extent > 0 else 0.0
@@ -65,7 +65,7 @@ def _morton_order(work: Blocks, scene: Scene, count: int) -> cl.Buffer:
     return ids
 
 
-def radix_sort(work: Blocks, codes: cl.Buffer, values: cl.Buffer, count: int) -> tuple[cl.Buffer, cl.Buffer]:
+def radix_sort(work: DataParallel, codes: cl.Buffer, values: cl.Buffer, count: int) -> tuple[cl.Buffer, cl.Buffer]:
     """Sort codes, uint64 below 2^CODE_BITS, with their values, uint32; stable. Frees the given arrays."""
     blocks = work.number(count)
     digits = work.empty(np.uint32, blocks << DIGIT_BITS)
@@ -79,7 +79,7 @@ def radix_sort(work: Blocks, codes: cl.Buffer, values: cl.Buffer, count: int) ->
     return codes, values
 
 
-def _centre_bounds(work: Blocks, scene: Scene, count: int) -> tuple[FloatArray, float]:
+def _centre_bounds(work: DataParallel, scene: Scene, count: int) -> tuple[FloatArray, float]:
     """Return twice the minimum of the centres (3,) float32, and twice their largest extent."""
     blocks = work.number(count)
     partial = work.empty(np.float32, 6 * blocks)

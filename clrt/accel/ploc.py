@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyopencl as cl
 
-from ..device.launches.data_parallel import Blocks
+from ..device.launches.data_parallel import DataParallel
 from ..device.programs.struct_types import record
 from .morton import Primitives
 
@@ -36,7 +36,7 @@ class BinaryTree:
         return sum(self.rounds)
 
 
-def cluster(work: Blocks, primitives: Primitives) -> BinaryTree:
+def cluster(work: DataParallel, primitives: Primitives) -> BinaryTree:
     """Build the binary BVH over at least two primitives."""
     clusters = primitives.count
     now, later = _columns(work, clusters), None
@@ -66,7 +66,7 @@ def cluster(work: Blocks, primitives: Primitives) -> BinaryTree:
     return BinaryTree(nodes, rounds + joins[:number])
 
 
-def _columns(work: Blocks, count: int) -> tuple[cl.Buffer, int]:
+def _columns(work: DataParallel, count: int) -> tuple[cl.Buffer, int]:
     """Allocate the columns of `count` clusters; return them with the pitch of their rows."""
     pitch = count + 2 * RADIUS
     return work.empty(np.float32, 7 * pitch), pitch

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..device.launches.data_parallel import Blocks
+from ..device.launches.data_parallel import DataParallel
 from ..device.launches.device_arrays import empty_array, on_device
 from ..device.open import Device
 from ..device.programs.preamble import defines, typedefs
@@ -16,7 +16,7 @@ from .layouts import BVH2_NODE, BVH8_NODE, LEAF_TRIANGLE, TRIANGLE_PACK, Layout
 from .wide import EMPTY
 
 
-class Recipe(NamedTuple):
+class RefitLayout(NamedTuple):
     """How a layout is refitted. file: the kernel for a level; node, leaf: its records; leaves: the buffer of leaves.
 
     gap: unused nodes between the root and the level below it.
@@ -29,8 +29,8 @@ class Recipe(NamedTuple):
     gap: int
 
 
-RECIPES = {"bvh8": Recipe("build/refit_bvh8.cl", BVH8_NODE, TRIANGLE_PACK, "packs", 0),
-           "bvh2": Recipe("build/refit_bvh2.cl", BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", 1)}
+RECIPES = {"bvh8": RefitLayout("build/refit_bvh8.cl", BVH8_NODE, TRIANGLE_PACK, "packs", 0),
+           "bvh2": RefitLayout("build/refit_bvh2.cl", BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", 1)}
 
 
 def can_refit(tree: Layout) -> bool:
@@ -46,7 +46,7 @@ class Refitter:
 
     def __init__(self, device: Device, tree: Layout, faces: IntArray, vertices: int) -> None:
         self._device, self._recipe = device, RECIPES[tree.name]
-        self._work = Blocks(device, program_source(tree.name))
+        self._work = DataParallel(device, program_source(tree.name))
         self._levels = tree.level_sizes
         self._faces, self._vertices = on_device(device, faces), empty_array(device, np.float32, 3 * vertices)
         self._tree = [tree.buffers[name].buffer for name in ("nodes", self._recipe.leaves)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyopencl as cl
 
-from ..device.launches.data_parallel import Blocks
+from ..device.launches.data_parallel import DataParallel
 from ..device.programs.struct_types import record
 from .morton import Primitives
 from .ploc import BINARY_NODE, BinaryTree
@@ -23,7 +23,7 @@ DEEP = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Leveled:
+class LevelOrderBvh:
     """A BVH in level order, root last, with the parents of all nodes and then of all primitives.
 
     parents: (nodes + primitives,) uint32. levels: (nodes,) uint32, depth | height << 16.
@@ -34,7 +34,7 @@ class Leveled:
     levels: cl.Buffer
 
 
-def reinsert(work: Blocks, primitives: Primitives, tree: BinaryTree, passes: int) -> BinaryTree:
+def reinsert(work: DataParallel, primitives: Primitives, tree: BinaryTree, passes: int) -> BinaryTree:
     """Return the BVH after some passes of moving subtrees to reduce the sum of surface areas. Frees `tree`.
 
     A pass never increases the sum. Leaves become at most 1.5 times as deep as they were, or DEEP.
@@ -49,7 +49,7 @@ def reinsert(work: Blocks, primitives: Primitives, tree: BinaryTree, passes: int
     return leveled.tree
 
 
-def _level(work: Blocks, primitives: Primitives, tree: BinaryTree) -> Leveled:
+def _level(work: DataParallel, primitives: Primitives, tree: BinaryTree) -> LevelOrderBvh:
     """Sort a BVH into level order and recompute its boxes; frees `tree`, whose root must be its last node."""
     root, listed = tree.count - 1, work.empty(np.uint32, tree.count)
     nodes, levels = work.empty(BINARY_NODE, tree.count), work.empty(np.uint32, tree.count)
@@ -69,10 +69,10 @@ def _level(work: Blocks, primitives: Primitives, tree: BinaryTree) -> Leveled:
     sizes.reverse()
     for first, count in zip(np.cumsum([0, *sizes]), sizes):
         work.run("refit_nodes", count, *primitives.arguments, nodes, int(first), levels)
-    return Leveled(BinaryTree(nodes, sizes), parents, levels)
+    return LevelOrderBvh(BinaryTree(nodes, sizes), parents, levels)
 
 
-def _move(work: Blocks, primitives: Primitives, leveled: Leveled, deepest: int) -> None:
+def _move(work: DataParallel, primitives: Primitives, leveled: LevelOrderBvh, deepest: int) -> None:
     """Find moves and apply those that win over conflicting ones; the boxes are then out of date."""
     tree = leveled.tree
     places, count = tree.count + primitives.count, 2 * -(-tree.count // TOPMOST)

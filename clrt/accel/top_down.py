@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bvh import BoolArray, FloatArray, IntArray, Tree, empty_tree
+from .bvh import BoolArray, FloatArray, IntArray, Bvh, empty_tree
 
 #: From this level on, nodes are split at the median of their order, so that depth <= MAX_FREE_DEPTH + ceil(log2 p).
 MAX_FREE_DEPTH = 40
@@ -77,7 +77,7 @@ class OpenNodes:
 Rule = Callable[[OpenNodes], BoolArray]
 
 
-def grow(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, small: int, rule: Rule) -> Tree:
+def grow(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, small: int, rule: Rule) -> Bvh:
     """Build a binary BVH over primitives with boxes (p, 3) float32, finite, split by `rule`.
 
     Nodes of up to `small` primitives become leaves without calling the rule. Nodes that it does not split become leaves
@@ -104,9 +104,9 @@ def grow(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, small: int,
         made += 2 * int(np.count_nonzero(~leaf))
         nodes = nodes.select(~leaf).split(right[~closed])
     boxes = np.concatenate(bounds, axis=1).T
-    return Tree(np.ascontiguousarray(boxes[:, :3]), np.ascontiguousarray(-boxes[:, 3:]),
-                np.concatenate(left_first).astype(np.int32), np.concatenate(count).astype(np.int32),
-                np.zeros(len(boxes), bool), order, np.empty(0, np.int32))
+    return Bvh(np.ascontiguousarray(boxes[:, :3]), np.ascontiguousarray(-boxes[:, 3:]),
+               np.concatenate(left_first).astype(np.int32), np.concatenate(count).astype(np.int32),
+               np.zeros(len(boxes), bool), order, np.empty(0, np.int32))
 
 
 def _nowhere(nodes: OpenNodes) -> BoolArray:

@@ -54,7 +54,7 @@ def _baldwin_weber(p0: Doubles, p1: Doubles, p2: Doubles) -> dict[str, Doubles]:
     return {name: np.concatenate([row, -_dot(row, p0)], axis=1) / _dot(n, free) for name, row in rows.items()}
 
 
-class Form(NamedTuple):
+class TriangleForm(NamedTuple):
     """How a test stores its triangles. leaf, pack: the records. fields: computes their contents except for `primitive`.
 
     fields takes p0, p1, p2 (n, 3) or, for packs, (n, 3, 8), and returns arrays (n, k) or (n, k, 8).
@@ -66,8 +66,8 @@ class Form(NamedTuple):
 
 
 #: Forms by test; the other tests use corners.
-FORMS = {"precomputed": Form(PRECOMPUTED_TRIANGLE, PRECOMPUTED_PACK, _precomputed),
-         "baldwin_weber": Form(BALDWIN_WEBER_TRIANGLE, BALDWIN_WEBER_PACK, _baldwin_weber)}
+FORMS = {"precomputed": TriangleForm(PRECOMPUTED_TRIANGLE, PRECOMPUTED_PACK, _precomputed),
+         "baldwin_weber": TriangleForm(BALDWIN_WEBER_TRIANGLE, BALDWIN_WEBER_PACK, _baldwin_weber)}
 
 
 def in_form(tree: Layout, triangle: str, device: Device | None) -> Layout:
@@ -83,7 +83,7 @@ def in_form(tree: Layout, triangle: str, device: Device | None) -> Layout:
     return replace(tree, buffers={**tree.buffers, **changed}, build_seconds=seconds)
 
 
-def _converted(corners: Records, dtype: np.dtype[np.void], form: Form) -> Records:
+def _converted(corners: Records, dtype: np.dtype[np.void], form: TriangleForm) -> Records:
     records = np.zeros(len(corners), dtype)
     records["primitive"] = corners["primitive"]
     for first in range(0, len(corners), CHUNK):

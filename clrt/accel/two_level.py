@@ -34,7 +34,7 @@ INSTANCE = record(to_object="(3,4)f4", root="i4", index="i4", pad="2i4")
 TRANSFORM_ROUNDING = 8 * 2.0**-24
 
 
-class TwoLevels:
+class TwoLevelBvh:
     """BVHs of meshes on a device, and above them the BVH over instances, which can be rebuilt.
 
     meshes: triangles (m, 3, 3) each, all of sizes near 1. mesh: (k,) int32 indices of `meshes`, one per instance.
@@ -63,7 +63,7 @@ class TwoLevels:
         self._buffers, self._roots = self._joined(trees)
         self._seconds = time.perf_counter() - start
 
-    def on(self, device: Device | None, buffers: dict[str, DeviceArray | NDArray[Any]]) -> TwoLevels:
+    def on(self, device: Device | None, buffers: dict[str, DeviceArray | NDArray[Any]]) -> TwoLevelBvh:
         """Return a copy whose buffers are on `device`."""
         other = copy(self)
         other._device, other._buffers = device, buffers

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from .builders import BUILDERS
-from .bvh import FloatArray, IntArray, Tree
+from .bvh import FloatArray, IntArray, Bvh
 from .cwbvh import CWBVH_NODE, compress
 from .layouts import BVH2_NODE, BVH8_NODE, LANES, Layout, Records, bvh2_nodes, wide_nodes
 from .wide import EMPTY, collapse, leaf_fields
 
 
-class Form(NamedTuple):
+class UpperLevelLayout(NamedTuple):
     """Requirements of two-level BVHs on a layout.
 
     node: its record. leaves: the buffer of leaves. room: the maximum number of nodes of a BVH over this many instances.
@@ -28,11 +28,11 @@ class Form(NamedTuple):
     node: np.dtype[np.void]
     leaves: str
     room: Callable[[int], int]
-    pack: Callable[[Tree], tuple[Layout, IntArray]]
+    pack: Callable[[Bvh], tuple[Layout, IntArray]]
     shift: Callable[[Records, int, int], None]
 
 
-def upper_level(form: Form, aabb_min: FloatArray, aabb_max: FloatArray) -> tuple[Layout, IntArray]:
+def upper_level(form: UpperLevelLayout, aabb_min: FloatArray, aabb_max: FloatArray) -> tuple[Layout, IntArray]:
     """Return the BVH over k instances' boxes (k, 3), with only the buffer `nodes`, and its order as in Form.pack."""
     tree = BUILDERS["sah"](aabb_min, aabb_max, 1, 1)
     leaves = tree.left_first.copy()
@@ -40,19 +40,19 @@ def upper_level(form: Form, aabb_min: FloatArray, aabb_max: FloatArray) -> tuple
     return form.pack(replace(tree, left_first=leaves, order=np.arange(len(tree.order), dtype=np.int32)))
 
 
-def _bvh2(tree: Tree) -> tuple[Layout, IntArray]:
+def _bvh2(tree: Bvh) -> tuple[Layout, IntArray]:
     layout = Layout("bvh2", {"nodes": bvh2_nodes(tree)}, tree.stack_bound, len(tree.count), tree.depth, tree.sah_cost())
     return layout, tree.order
 
 
-def _bvh8(tree: Tree) -> tuple[Layout, IntArray]:
+def _bvh8(tree: Bvh) -> tuple[Layout, IntArray]:
     wide = collapse(tree, LANES)
     layout = Layout("bvh8", {"nodes": wide_nodes(wide, wide.child)}, wide.stack_bound, len(wide.child), wide.depth,
                     wide.sah_cost())
     return layout, wide.order
 
 
-def _cwbvh(tree: Tree) -> tuple[Layout, IntArray]:
+def _cwbvh(tree: Bvh) -> tuple[Layout, IntArray]:
     packed = compress(tree)
     # One more stack entry: while a node's instances are visited, all of its child nodes are on the stack.
     layout = Layout("cwbvh", {"nodes": packed.nodes}, packed.stack + 1, len(packed.nodes), packed.wide.depth,
@@ -86,6 +86,6 @@ def _binary_room(instances: int) -> int:
 
 
 #: Forms by layout.
-FORMS = {"bvh2": Form(BVH2_NODE, "leaf_triangles", _binary_room, _bvh2, _shift_bvh2),
-         "bvh8": Form(BVH8_NODE, "packs", _wide_room, _bvh8, _shift_bvh8),
-         "cwbvh": Form(CWBVH_NODE, "leaf_triangles", _wide_room, _cwbvh, _shift_cwbvh)}
+FORMS = {"bvh2": UpperLevelLayout(BVH2_NODE, "leaf_triangles", _binary_room, _bvh2, _shift_bvh2),
+         "bvh8": UpperLevelLayout(BVH8_NODE, "packs", _wide_room, _bvh8, _shift_bvh8),
+         "cwbvh": UpperLevelLayout(CWBVH_NODE, "leaf_triangles", _wide_room, _cwbvh, _shift_cwbvh)}

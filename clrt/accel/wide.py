@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .bvh import BoolArray, FloatArray, IntArray, Tree, expected_work, half_area, intersections
+from .bvh import BoolArray, FloatArray, IntArray, Bvh, expected_work, half_area, intersections
 
 #: Child reference of an unused slot; used slots come first.
 EMPTY = 0x7FFFFFFF
@@ -19,7 +19,7 @@ MAX_LEAF = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Wide:
+class WideBvh:
     """A wide BVH of k nodes in breadth-first order, the root first.
 
     aabb_min, aabb_max: (k, width, 3) float32, the children's boxes; inverted (min +inf, max −inf) in unused slots. Such
@@ -91,7 +91,7 @@ def leaf_fields(reference: IntArray) -> tuple[IntArray, BoolArray, IntArray]:
     return bits >> 4, (bits >> 3 & 1).astype(bool), (bits & 7) + 1
 
 
-def collapse(tree: Tree, width: int = 8, pack: int = 1) -> Wide:
+def collapse(tree: Bvh, width: int = 8, pack: int = 1) -> WideBvh:
     """Collapse a binary BVH to the wide one of least expected cost; its leaves stay as they are.
 
     Dynamic programming over the surface area heuristic (Ylitie, Karras, Laine 2017, "Efficient Incoherent Ray Traversal
@@ -114,7 +114,7 @@ def collapse(tree: Tree, width: int = 8, pack: int = 1) -> Wide:
     return _wide(tree, np.concatenate(slots))
 
 
-def _plan(tree: Tree, width: int, pack: int) -> tuple[BoolArray, NDArray[np.int8]]:
+def _plan(tree: Bvh, width: int, pack: int) -> tuple[BoolArray, NDArray[np.int8]]:
     """Plan how to represent each node's subtree by at most b roots, b = 0 … width, at the least cost.
 
     opened: (n + 1, width + 1) bool, whether to replace the node by the roots of its two children.
@@ -141,7 +141,7 @@ def _plan(tree: Tree, width: int, pack: int) -> tuple[BoolArray, NDArray[np.int8
     return opened, share
 
 
-def _open(tree: Tree, tops: IntArray, opened: BoolArray, share: NDArray[np.int8], width: int) -> IntArray:
+def _open(tree: Bvh, tops: IntArray, opened: BoolArray, share: NDArray[np.int8], width: int) -> IntArray:
     """Return the binary nodes, (k, width), that become the children of the wide nodes for `tops` (k,)."""
     slots, roots = np.full((len(tops), width), -1, np.int32), np.zeros((len(tops), width), np.intp)
     slots[:, 0], roots[:, 0] = tops, width
@@ -155,7 +155,7 @@ def _open(tree: Tree, tops: IntArray, opened: BoolArray, share: NDArray[np.int8]
     return slots
 
 
-def _wide(tree: Tree, slots: IntArray) -> Wide:
+def _wide(tree: Bvh, slots: IntArray) -> WideBvh:
     """Return boxes and references for slots (k, width) of binary nodes, whose rows are in breadth-first order."""
     nowhere = np.full((1, 3), np.inf, np.float32)
     leaf = np.append(tree.leaf, False)[slots]
@@ -164,5 +164,5 @@ def _wide(tree: Tree, slots: IntArray) -> Wide:
     child = np.full(slots.shape, EMPTY, np.int32)
     child[leaf] = leaf_reference(tree.left_first[nodes], tree.spheres[nodes], tree.count[nodes])
     child[interior] = np.arange(1, 1 + np.count_nonzero(interior))
-    return Wide(np.concatenate([tree.aabb_min, nowhere])[slots], np.concatenate([tree.aabb_max, -nowhere])[slots],
-                child, tree.order, tree.sphere_order)
+    return WideBvh(np.concatenate([tree.aabb_min, nowhere])[slots], np.concatenate([tree.aabb_max, -nowhere])[slots],
+                   child, tree.order, tree.sphere_order)

@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from ..device.open import Device
-from .kernel_calls import Probe
+from .kernel_calls import CheckProgram
 
 #: A small workload, and the seconds within which a device must do it to get the full check. A CPU takes a tenth of
 #: that.
@@ -31,7 +31,7 @@ def share(device: Device, full: int, least: int) -> int:
 
 def _seconds(device: Device) -> float:
     """Return the minimum time of the small workload, without compiling its kernel."""
-    probe, samples = Probe(device, "samples", device.lanes), np.ones((SAMPLES, ITEMS), np.float32)
+    probe, samples = CheckProgram(device, "samples", device.lanes), np.ones((SAMPLES, ITEMS), np.float32)
     out = [(np.float32, 4 * ITEMS), (np.uint32, 2 * ITEMS)]
     probe.run("sums", ITEMS // device.lanes, samples, 1, out=out)
     best, start = np.inf, time.perf_counter()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..device.open import Device
 from .exact_floats import Floats, fused
-from .kernel_calls import Probe
+from .kernel_calls import CheckProgram
 
 #: SIMD widths and the suffixes of their types: scalars, as on GPUs, and vectors of eight. All devices are checked with
 #: both.
@@ -62,7 +62,7 @@ ROWS = (*EXACT, *NORMAL, *COMPARISONS, *LIMITS, "contraction", "mix", "fmin", "f
 def float_rows(device: Device, lanes: int, a: Floats, b: Floats, c: Floats) -> dict[str, NDArray[np.uint32]]:
     """Return the device's results for (n,) operands, as bits, by operation."""
     padded = np.resize(np.stack([a, b, c], axis=1), (-(-len(a) // 8) * 8, 3))
-    rows = Probe(device, "floats", lanes, ROWS).rows("floats", lanes, padded.T)
+    rows = CheckProgram(device, "floats", lanes, ROWS).rows("floats", lanes, padded.T)
     return {name: row[:len(a)] for name, row in rows.items()}
 
 

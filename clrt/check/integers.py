@@ -13,7 +13,7 @@ from ..device.open import Device
 from .exact_floats import nearest_float32
 from .findings import Findings
 from .floats import LANES
-from .kernel_calls import Probe
+from .kernel_calls import CheckProgram
 
 COUNT = 2048
 #: Minimum number of loop iterations per work-item, needed to trace a path of depth eight.
@@ -82,9 +82,9 @@ def check_integers(device: Device, findings: Findings) -> None:
     for lanes in LANES:
         true = 1 if lanes == 1 else -1
         masks = {name: (lambda a, b, compare=compare: true * compare(a, b)) for name, compare in COMPARISONS.items()}
-        _check_rows(Probe(device, "integers", lanes, (*INTEGERS, *masks)), "integers", lanes, INTEGERS | masks, inputs,
-                    findings)
-    words = Probe(device, "words", 1, tuple(WORDS))
+        _check_rows(CheckProgram(device, "integers", lanes, (*INTEGERS, *masks)), "integers", lanes, INTEGERS | masks,
+                    inputs, findings)
+    words = CheckProgram(device, "words", 1, tuple(WORDS))
     _check_rows(words, "words", 1, WORDS, inputs, findings)
     _check_loops(device, findings)
 
@@ -102,8 +102,8 @@ def _check_loops(device: Device, findings: Findings) -> None:
         findings.failures.append(f"a loop of {TURNS} iterations ends after {turns}")
 
 
-def _check_rows(probe: Probe, kernel: str, lanes: int, operations: Mapping[str, Operation], inputs: NDArray[np.uint32],
-                findings: Findings) -> None:
+def _check_rows(probe: CheckProgram, kernel: str, lanes: int, operations: Mapping[str, Operation],
+                inputs: NDArray[np.uint32], findings: Findings) -> None:
     a, b = inputs
     for name, row in probe.rows(kernel, lanes, inputs).items():
         truth = [operations[name](x, y) % (1 << 32) for x, y in zip(a.tolist(), b.tolist())]

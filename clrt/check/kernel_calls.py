@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from ..device.launches.data_parallel import Blocks
+from ..device.launches.data_parallel import DataParallel
 from ..device.open import Device
 from ..device.programs.preamble import defines, typedefs
 from ..device.programs.program import compose
@@ -24,11 +24,11 @@ def source(file: str, lanes: int, rows: Iterable[str] = ()) -> str:
                    {"SAMPLER": ["sampler/independent.cl"]})
 
 
-class Probe:
+class CheckProgram:
     """The program of one of FILES on a device."""
 
     def __init__(self, device: Device, file: str, lanes: int = 1, rows: Sequence[str] = ()) -> None:
-        self.work = Blocks(device, source(file, lanes, rows))
+        self.work = DataParallel(device, source(file, lanes, rows))
         self._rows = rows
 
     def run(self, kernel: str, count: int, *arguments: NDArray[Any] | int,

@@ -11,7 +11,7 @@ from ..device.open import Device
 from ..queries.mesh import RayQuery
 from .effort import effort, share
 from .findings import Findings
-from .star import SQUARES, Doubles, Rays, Star, make_star, rays_from_elsewhere, rays_from_inside
+from .star import SQUARES, Doubles, Rays, StarMesh, make_star, rays_from_elsewhere, rays_from_inside
 
 ELSEWHERE = 300
 #: Minimum squares along an edge of the surface, and minimum rays from inside, on a slow device.
@@ -43,12 +43,12 @@ def check_tree_builder(device: Device, findings: Findings) -> None:
     findings.expect(built == other, "hits in the BVH built by the device", ("gave", built), ("numpy's", other))
 
 
-def _star(device: Device) -> Star:
+def _star(device: Device) -> StarMesh:
     """Return a surface with as many triangles as suit the device."""
     return make_star(2 * max(FEW_SQUARES // 2, round(SQUARES // 2 * effort(device) ** 0.5)))
 
 
-def _rays(device: Device, star: Star) -> Rays:
+def _rays(device: Device, star: StarMesh) -> Rays:
     """Return rays from inside through all parts of each triangle, or an evenly spaced subset for a slow device."""
     rays = rays_from_inside(star)
     n = len(rays.t)
@@ -59,11 +59,11 @@ def _shuffled(rays: Rays) -> Rays:
     return rays.take(np.random.default_rng(10).permutation(len(rays.t)))
 
 
-def _query(device: Device, star: Star, **options: Any) -> RayQuery:
+def _query(device: Device, star: StarMesh, **options: Any) -> RayQuery:
     return RayQuery(star.vertices, star.faces, device=device.info.id, **options)
 
 
-def _check_hits(query: RayQuery, star: Star, rays: Rays, findings: Findings) -> NDArray[Any]:
+def _check_hits(query: RayQuery, star: StarMesh, rays: Rays, findings: Findings) -> NDArray[Any]:
     """Check whether, what and where each ray hits, also with rays that end before or behind it; return the hits."""
     hits = query.closest_hit(rays.origins, rays.directions)
     meets = np.isfinite(rays.t)
@@ -82,7 +82,7 @@ def _check_hits(query: RayQuery, star: Star, rays: Rays, findings: Findings) -> 
     return hits
 
 
-def _errors(star: Star, rays: Rays, hits: NDArray[Any]) -> Doubles:
+def _errors(star: StarMesh, rays: Rays, hits: NDArray[Any]) -> Doubles:
     """Return the distances of the points at t and at (u, v) from the exact hit, (n,), in coordinate roundings."""
     both = np.isfinite(rays.t) & (hits["primitive"] >= 0)
     t, t_exact = np.where(both, hits["t"], 0.0)[:, None], np.where(both, rays.t, 0.0)[:, None]

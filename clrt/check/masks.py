@@ -6,7 +6,7 @@ import numpy as np
 
 from ..device.open import Device
 from .findings import Findings
-from .kernel_calls import Probe
+from .kernel_calls import CheckProgram
 
 COUNT = 512
 
@@ -17,7 +17,7 @@ def check_masks(device: Device, findings: Findings) -> None:
     mask = (np.arange(COUNT)[:, None] >> np.arange(8) & 1).astype(bool)
     b = rng.permuted(np.tile(np.arange(1, 9), (COUNT, 1)), axis=1).astype(np.float32)
     a = np.where(mask, b - 0.5, b + rng.integers(0, 2, b.shape)).astype(np.float32)
-    out, = Probe(device, "masks").run("masks", COUNT, np.stack([a, b]), out=[(np.int32, 3 * 8 * COUNT)])
+    out, = CheckProgram(device, "masks").run("masks", COUNT, np.stack([a, b]), out=[(np.int32, 3 * 8 * COUNT)])
     lanes, stored, facts = out.reshape(3, COUNT, 8)
     findings.same(lanes.ravel(), np.where(mask, -1, 0).ravel(), "lanes of a comparison", a.ravel(), b.ravel())
     first = np.where(mask.any(axis=1), mask.argmax(axis=1), -1)

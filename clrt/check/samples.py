@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..device.open import Device
 from .effort import share
 from .findings import Findings
-from .kernel_calls import Probe
+from .kernel_calls import CheckProgram
 
 Words = NDArray[np.uint32]
 COUNT = 1024
@@ -17,7 +17,7 @@ SAMPLES = 128
 
 def check_random_numbers(device: Device, findings: Findings) -> None:
     """Check that the device's numbers equal those of the same hash in numpy, and lie in [0, 1)."""
-    rng, probe = np.random.default_rng(5), Probe(device, "samples", device.lanes)
+    rng, probe = np.random.default_rng(5), CheckProgram(device, "samples", device.lanes)
     index = rng.integers(0, 1 << 32, (2, COUNT), np.uint32)
     for seed, dimension in ((0, 0), (7, 3), (0xffffffff, 1000)):
         bits, units = probe.run("numbers", COUNT // device.lanes, index, seed, dimension,
@@ -52,7 +52,7 @@ def check_sums(device: Device, findings: Findings) -> None:
     samples = rng.integers(0, 256, (SAMPLES, count)) << 12 * rng.integers(0, 2, (SAMPLES, count))
     kept = rng.random(samples.shape) < 63 / 64
     others = rng.choice(np.array([np.nan, np.inf, -np.inf, 2e31], np.float32), samples.shape)
-    sums, counts = Probe(device, "samples", device.lanes).run(
+    sums, counts = CheckProgram(device, "samples", device.lanes).run(
         "sums", count // device.lanes, np.where(kept, samples, others).astype(np.float32), SAMPLES,
         out=[(np.float32, 4 * count), (np.uint32, 2 * count)])
     counted = np.concatenate([kept.sum(axis=0), (~kept).sum(axis=0)])

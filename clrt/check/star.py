@@ -24,7 +24,7 @@ MET = np.array([(0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 1, 1), (1, 2, 2), (2, 0, 0)
 CLEAR = 0.01
 
 
-class Star(NamedTuple):
+class StarMesh(NamedTuple):
     """The closed surface. vertices: (n, 3); faces: (m, 3), counter-clockwise seen from outside."""
 
     vertices: Integers
@@ -48,7 +48,7 @@ class Rays(NamedTuple):
         return Rays(self.origins[order], self.directions[order], self.t[order], self.corners[order])
 
 
-def make_star(squares: int = SQUARES) -> Star:
+def make_star(squares: int = SQUARES) -> StarMesh:
     """Return the surface, with the same factors every time: 12 · squares² triangles."""
     half = squares // 2
     grid = np.stack(np.meshgrid(*[np.arange(-half, half + 1)] * 3, indexing="ij"), axis=-1)
@@ -62,10 +62,10 @@ def make_star(squares: int = SQUARES) -> Star:
             a, b, c, d = square[:-1, :-1], square[1:, :-1], square[1:, 1:], square[:-1, 1:]
             triangles = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
             sides.append(triangles if side else triangles[:, ::-1])
-    return Star(grid[outside] * factors, np.concatenate(sides))
+    return StarMesh(grid[outside] * factors, np.concatenate(sides))
 
 
-def rays_from_inside(star: Star) -> Rays:
+def rays_from_inside(star: StarMesh) -> Rays:
     """Return rays from the origin through each triangle: to its vertices, its edges' middles, and its interior."""
     n = len(star.faces) * len(WEIGHTS)
     directions = np.einsum("wk,fkx->fwx", WEIGHTS, star.vertices[star.faces]).reshape(n, 3)
@@ -74,7 +74,7 @@ def rays_from_inside(star: Star) -> Rays:
     return Rays(zeros, np.where(directions == 0, zeros, directions), t, star.faces[:, MET].reshape(n, 3))
 
 
-def rays_from_elsewhere(star: Star, count: int) -> Rays:
+def rays_from_elsewhere(star: StarMesh, count: int) -> Rays:
     """Return up to `count` rays between integer points in and around the surface, tested exactly with all triangles."""
     rng, size = np.random.default_rng(9), int(np.abs(star.vertices).max())
     origins, targets = rng.integers(-2 * size, 2 * size, (2, count, 3))
@@ -90,7 +90,7 @@ def rays_from_elsewhere(star: Star, count: int) -> Rays:
     return Rays(origins[clear].astype(np.float64), directions.astype(np.float64), nearest, corners)
 
 
-def meet_planes(star: Star, origins: Integers, directions: Integers) -> tuple[Doubles, Doubles, Doubles]:
+def meet_planes(star: StarMesh, origins: Integers, directions: Integers) -> tuple[Doubles, Doubles, Doubles]:
     """Return (n, m) each: t at the triangles' planes, the least barycentric coordinate there, and the cosine.
 
     All are quotients of integers below 2^53, which are exact.

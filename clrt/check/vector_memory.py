@@ -6,7 +6,7 @@ import numpy as np
 
 from ..device.open import Device
 from .findings import Findings
-from .kernel_calls import Probe
+from .kernel_calls import CheckProgram
 
 COUNT, PLACES = 4096, 7
 #: Large enough for several work-groups to scan parts of it (device/launches/data_parallel.py), and not a round number.
@@ -15,7 +15,7 @@ SCANNED = 30011
 
 def check_memory(device: Device, findings: Findings) -> None:
     """Check that copies are exact, that atomics lose no update, and that prefix sums are correct."""
-    rng, probe = np.random.default_rng(4), Probe(device, "memory")
+    rng, probe = np.random.default_rng(4), CheckProgram(device, "memory")
     floats = rng.random(17 * COUNT, np.float32)
     moved, = probe.run("move", COUNT, floats, out=[(np.float32, floats.size)])
     findings.same(moved, floats, "numbers moved by vectors")

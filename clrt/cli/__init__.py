@@ -13,7 +13,7 @@ from typing import NoReturn
 import click
 
 from ..errors import ClrtError, DeviceError, KernelError, OutputError
-from .options import Group
+from .options import CommandGroup
 from .streams import open_missing, patient_stdout, show_names, stdout_problem, tell
 
 STARTED = time.perf_counter()
@@ -24,7 +24,7 @@ OBJECTS = 100_000
 COMMANDS = ("render", "view", "info", "debug", "convert", "compare", "devices", "bench", "cache", "doctor")
 
 
-class _Commands(Group):
+class _Commands(CommandGroup):
     """Commands by name, each imported on first use."""
 
     def list_commands(self, context: click.Context) -> list[str]:

@@ -18,10 +18,10 @@ from .bench_peers import peers_command
 from .bench_rays import rays_command
 from .bench_render_fidelity import render_fidelity_command
 from .bench_theses import theses_command
-from .options import Group
+from .options import CommandGroup
 
 
-@click.group(cls=Group)
+@click.group(cls=CommandGroup)
 def command() -> None:
     """Measure speed and accuracy: rays, build, hits, peers, converge, agree, combinations, floor, blender,
     mitsuba-data, render-fidelity, numerics, theses, farm."""

@@ -38,7 +38,7 @@ def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: st
     of a render, the samples are exactly those of that render."""
     if click.get_current_context().obj == PROGRAM:
         guarded(lambda: "")
-    from ..debug.names import Names
+    from ..debug.names import SceneNames
     from ..debug.summary import summary
     from ..debug.text import path_lines
     from ..debug.trace import trace_pixel
@@ -52,7 +52,7 @@ def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: st
     content.render = settings = replace(content.render, **{k: v for k, v in chosen.items() if v is not None})
     pixel = pixel or (settings.size[0] // 2, settings.size[1] // 2)
     paths = trace_pixel(content, open_device(device), pixel, _choices(**given), lanes)
-    names = Names(content, paths.compiled)
+    names = SceneNames(content, paths.compiled)
     found = summary(paths, names)
     listed = [(i, paths.values[i].tolist(), list(vertices(paths, names, i))) for i in range(min(samples, settings.spp))]
     if as_json:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from ..errors import UsageError
-from .frames import Sequence
+from .frames import FrameSequence
 from .goal import Goal
 from .interrupt import Interruptible
 from .outputs import Outputs
@@ -74,7 +74,7 @@ def is_huge(size: tuple[int, int]) -> bool:
 def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, results: Outputs,
                 progress: Progress) -> bool:
     """Render in bands, each to the goal, and write the results; return False if interrupted."""
-    from ..farm.banded_picture import Banded
+    from ..farm.banded_picture import BandedPicture
     from ..farm.orders import PictureOrder
 
     for name, value in {"--time": goal.seconds, "--aov": options["aovs"] or None, "--plot": results.plot,
@@ -85,8 +85,8 @@ def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: G
     checkpoint, resume = options["checkpoint"], options["resume"]
     of_farm = ("checkpoint", "resume", "checkpoint_seconds", "aovs")
     chosen = {name: value for name, value in options.items() if name not in of_farm}
-    banded = Banded(PictureOrder(scene, chosen, spp=goal.spp, error=goal.error),
-                    checkpoint or Path(f"{next(iter(results.pictures), 'image')}.bands"))
+    banded = BandedPicture(PictureOrder(scene, chosen, spp=goal.spp, error=goal.error),
+                           checkpoint or Path(f"{next(iter(results.pictures), 'image')}.bands"))
     interrupted: list[bool] = []
     with Interruptible(lambda: interrupted.append(True)):
         for done, count in banded.render(cluster, resume):
@@ -102,7 +102,7 @@ def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: G
     return not interrupted
 
 
-def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, sequence: Sequence,
+def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, sequence: FrameSequence,
                   progress: Progress) -> bool:
     """Render the remaining frames, each on a worker, and encode the videos; return False if interrupted."""
     from ..farm.orders import PictureOrder

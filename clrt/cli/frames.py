@@ -25,7 +25,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 FILES = {"inputs", "pictures", "report", "plot", "force", "header", "spool", "pipes", "_errors"}
 
 
-class Numbers(click.ParamType[str]):
+class FrameNumbers(click.ParamType[str]):
     """Frames: all, or numbers and ranges such as 3,7,0-99:5. The value stays a string, which `_numbers` parses."""
 
     name = "FRAMES"
@@ -44,7 +44,7 @@ def frame_options(command: F) -> F:
                      help="Frames per second; default: the scene's."),
         click.option("--turntable", type=click.IntRange(min=1), metavar="N",
                      help="Orbit once around the point the camera looks at, in N frames."),
-        click.option("--frames", type=Numbers(),
+        click.option("--frames", type=FrameNumbers(),
                      help="Frames of an animation, written to numbered files (name_####.png) or a video (.gif, .mp4, "
                           ".webm): all, or numbers and ranges such as 12, 0-47, 0-99:5."),
     ]:
@@ -53,7 +53,7 @@ def frame_options(command: F) -> F:
 
 
 @dataclass
-class Sequence:
+class FrameSequence:
     """Frames to render. outputs: with one file name pattern for all frames; videos: of these frames; chosen: frame
     numbers, None for all; resume: whether existing frames are skipped."""
 
@@ -138,7 +138,7 @@ class Sequence:
                 spool.parent.rmdir()
 
 
-def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Mapping[str, object]) -> Sequence:
+def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Mapping[str, object]) -> FrameSequence:
     """Return the sequence of the requested outputs, of which some may be videos; single: still-image options."""
     from ..output.video import is_video
 
@@ -152,7 +152,7 @@ def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Ma
     if videos and not any(path.suffix.lower() == ".png" for path in pictures):
         spool = videos[0].with_name(f"{videos[0].name}.frames") / "####.png"
         outputs, pictures = replace(outputs, spool=spool), (*pictures, spool)
-    return Sequence(replace(outputs, pictures=pictures), videos, _numbers(frames or "all"), resume)
+    return FrameSequence(replace(outputs, pictures=pictures), videos, _numbers(frames or "all"), resume)
 
 
 def _numbers(text: str) -> list[int] | None:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from ..rendering.renderer import State
 
 
-class Pace:
+class RenderSpeed:
     """Current speed of a render, which varies with other programs' load, and with where samples are taken."""
 
     WINDOW = 10.0

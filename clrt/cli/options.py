@@ -12,7 +12,7 @@ import click
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-class Group(click.Group):
+class CommandGroup(click.Group):
     """Group of commands that suggests the closest name for a misspelled one."""
 
     def resolve_command(self, context: click.Context, arguments: list[str]

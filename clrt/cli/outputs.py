@@ -17,7 +17,7 @@ from .fallback import kept_elsewhere
 from .pipes import STDOUT, Pipe
 
 if TYPE_CHECKING:
-    from ..farm.banded_picture import Banded
+    from ..farm.banded_picture import BandedPicture
     from ..output.image import Image
     from ..rendering.renderer import Renderer
 
@@ -128,7 +128,7 @@ class Outputs:
         for pipe in () if raw else self.pipes:
             self._write_pipe(pipe, lambda path: save(path, alone if path.suffix == ".png" else image))
 
-    def save_rows(self, banded: Banded) -> None:
+    def save_rows(self, banded: BandedPicture) -> None:
         """Write image files and report of an image that is stored in bands; raises OutputError at the end."""
         from ..output.report import header_of, write_report
 

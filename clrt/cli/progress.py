@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import logging
-import os
-import sys
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from .goal import Goal, Pace, time_left
+from .goal import Goal, RenderSpeed, time_left
 from .streams import tell
 
 if TYPE_CHECKING:
@@ -22,7 +20,7 @@ class Progress:
     """Progress that shows nothing; base class of the others."""
 
     def __init__(self) -> None:
-        self._pace = Pace()
+        self._pace = RenderSpeed()
         self._workers: list[dict[str, Any]] = []
         self._bands = -1
 
@@ -43,7 +41,7 @@ class Progress:
 
     def frame(self, number: int, done: int, count: int) -> None:
         """Begin the frame with this number; `done` of the `count` frames to render are finished."""
-        self._pace = Pace()
+        self._pace = RenderSpeed()
 
     def state(self, state: State, goal: Goal) -> None:
         """Show a state of the render."""
@@ -138,28 +136,6 @@ class JsonLog(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Forward a record to the display."""
         self._progress.warning(self.format(record))
-
-
-def make_progress(kind: str | None, quiet: bool) -> Progress:
-    """Return the display of that kind; by default a bar on an interactive terminal, otherwise plain lines.
-
-    A bar needs a terminal: without one, plain lines are used instead.
-    """
-    if quiet:
-        return Progress()
-    if kind == "json":
-        return JsonProgress()
-    if sys.stderr.isatty() and (kind == "bar" or kind is None and _is_watched()):
-        from .bar import BarProgress
-
-        return BarProgress()
-    return PlainProgress()
-
-
-def _is_watched() -> bool:
-    """Return whether the terminal can redraw lines and is not a CI log, by the variables TERM and CI."""
-    terminal = os.environ.get("TERM", "xterm" if sys.platform == "win32" else "dumb")
-    return terminal not in ("", "dumb", "unknown") and os.environ.get("CI", "false") in ("", "0", "false")
 
 
 def where(device: str, device_bytes: int) -> str:

@@ -16,8 +16,9 @@ import click
 from ..errors import DeviceError, OutputError, ReaderGoneError, UsageError
 from ..threads import beside
 from . import PROGRAM
+from .displays import make_progress
 from .farm import cluster_for, farm_options, is_huge, make_renderer, render_frames, render_huge
-from .frames import Sequence, frame_options, make_sequence
+from .frames import FrameSequence, frame_options, make_sequence
 from .goal import Goal
 from .guard import guarded
 from .interrupt import Interruptible, end_by_signals
@@ -25,7 +26,7 @@ from .logs import silence, verbose_option
 from .options import picture_options, tracing_options
 from .outputs import Outputs
 from .pipes import split_pipes
-from .progress import Progress, make_progress
+from .progress import Progress
 
 if TYPE_CHECKING:
     from ..device.open import Device
@@ -207,7 +208,7 @@ def _denoiser() -> Denoiser:
     return Denoiser()
 
 
-def _render_frames(renderer: Renderer, sequence: Sequence, goal: Goal, denoiser: Denoiser | None,
+def _render_frames(renderer: Renderer, sequence: FrameSequence, goal: Goal, denoiser: Denoiser | None,
                    progress: Progress) -> None:
     """Render the remaining frames, each to the goal, and encode the videos."""
     shots = list(sequence.left(renderer.scene, renderer.choices, goal))

@@ -46,7 +46,7 @@ def command(scene: Path, camera: str | None, devices: tuple[str, ...], view: str
     from ..output.view_transform import check_view
     from ..scene.model import RenderSettings
     from ..scene.validation.field_types import field_problems
-    from ..window.app import App, Look
+    from ..window.app import App, DisplaySettings
 
     check_view(view, exposure)
     for selector in devices or (None,):
@@ -56,7 +56,7 @@ def command(scene: Path, camera: str | None, devices: tuple[str, ...], view: str
         raise UsageError("\n".join(problems))
     content = load(scene, camera)
     content.render = replace(content.render, **chosen)
-    app = App(content, Settings(device=devices or None), Look(view, exposure))
+    app = App(content, Settings(device=devices or None), DisplaySettings(view, exposure))
     with Interruptible(app.close) as interruptible:
         app.run()
     if interruptible.asked:

@@ -15,7 +15,7 @@ from ..scene.provenance import material_of
 IntArray = NDArray[np.int64]
 
 
-class Names:
+class SceneNames:
     """Names in one scene, as `compiled`. Objects are numbered as in the AOV `object`."""
 
     def __init__(self, scene: Scene, compiled: CompiledScene) -> None:

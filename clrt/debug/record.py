@@ -23,7 +23,7 @@ VERTEX = record(position="3f4", distance="f4", geometric_normal="3f4", primitive
                 emission_clamp="f4", direct_clamp="f4")
 
 
-class End(IntEnum):
+class PathEnd(IntEnum):
     """Reason why a path ends at a vertex. NONE: it continues. SIDE: the BSDF sample is on the wrong side of the
     geometric normal. LOOPS: the driver ended the kernel's loops (device.loops)."""
 
@@ -41,5 +41,5 @@ def vertex_preamble() -> str:
     lists = {"ROWS": np.dtype("3f4"), "REALS": np.dtype("f4"), "INTS": np.dtype("i4")}
     members = {kind: [name for name in VERTEX.names or () if VERTEX[name] == of] for kind, of in lists.items()}
     return "\n".join([
-        typedefs({"Vertex": VERTEX}), defines({f"END_{end.name}": int(end) for end in End}),
+        typedefs({"Vertex": VERTEX}), defines({f"END_{end.name}": int(end) for end in PathEnd}),
         *(f"#define VERTEX_{kind}(X) {' '.join(f'X({name})' for name in names)}" for kind, names in members.items())])

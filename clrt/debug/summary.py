@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rendering.compile.lights.environment_map import LUMINANCE
-from .names import Names
+from .names import SceneNames
 from .outcomes import Outcome, outcomes
-from .record import End
+from .record import PathEnd
 from .trace import PixelPaths, contributions
 
 #: Maximum number of causes that are named.
 MOST_NAMED = 3
 
 
-def summary(paths: PixelPaths, names: Names) -> str:
+def summary(paths: PixelPaths, names: SceneNames) -> str:
     """Return a summary of all samples of a pixel."""
     samples, dropped = len(paths.starts), int(np.count_nonzero(~paths.kept))
     facts = [f"{dropped} of {samples} samples are not finite and were dropped"] if dropped else []
@@ -31,7 +31,7 @@ def summary(paths: PixelPaths, names: Names) -> str:
     return f"{title}: {'; '.join(facts)}"
 
 
-def _first(paths: PixelPaths, names: Names) -> str:
+def _first(paths: PixelPaths, names: SceneNames) -> str:
     """Return what the camera sees."""
     rows = paths.rows[paths.starts]
     rows = rows[rows["primitive"] >= 0]
@@ -42,7 +42,7 @@ def _first(paths: PixelPaths, names: Names) -> str:
     return f"the camera sees {' and '.join(seen)}"
 
 
-def _sources(paths: PixelPaths, names: Names) -> str:
+def _sources(paths: PixelPaths, names: SceneNames) -> str:
     """Return the shares of the light by source, and how much of it is indirect."""
     rows, kept = paths.rows, np.repeat(paths.kept, paths.lengths)
     shares: Counter[str] = Counter()
@@ -59,7 +59,7 @@ def _sources(paths: PixelPaths, names: Names) -> str:
 
 
 def _by_source(rows: NDArray[Any], part: str, light: NDArray[np.float64],
-               names: Names) -> dict[str, NDArray[np.bool_]]:
+               names: SceneNames) -> dict[str, NDArray[np.bool_]]:
     """Return which rows' light is from which source. An emissive mesh is one, however many triangle lights it has."""
     key = rows["emitter" if part == "emission" else "light"]
     found: dict[str, NDArray[np.bool_]] = {}
@@ -70,16 +70,16 @@ def _by_source(rows: NDArray[Any], part: str, light: NDArray[np.float64],
     return found
 
 
-def _darkness(paths: PixelPaths, names: Names) -> list[str]:
+def _darkness(paths: PixelPaths, names: SceneNames) -> list[str]:
     """Return what keeps light from reaching a pixel, as far as its paths show it."""
     rows, features = paths.rows, paths.compiled.features
     if not {"LIGHTS", "SKY"} & set(features):
         return ["nothing in this scene emits light"]
-    escaped = rows["end"] == End.ESCAPED
+    escaped = rows["end"] == PathEnd.ESCAPED
     if escaped[paths.starts].all():
         return [f"all {len(paths.starts)} camera rays miss every object, and {_beyond(names)}"]
     facts = [_first(paths, names)]
-    if paths.lengths.max() == 1 and (rows["end"] == End.DEPTH).any():
+    if paths.lengths.max() == 1 and (rows["end"] == PathEnd.DEPTH).any():
         facts.append("the depth limit of 1 shows emission alone")
     backs = rows[(rows["emitter"] >= 0) & (rows["front"] == 0) & ~rows["radiance"].any(axis=1)]
     if len(backs):
@@ -92,7 +92,7 @@ def _darkness(paths: PixelPaths, names: Names) -> list[str]:
     return facts + _ends(paths, names)
 
 
-def _light_samples(rows: NDArray[Any], names: Names, title: str) -> list[str]:
+def _light_samples(rows: NDArray[Any], names: SceneNames, title: str) -> list[str]:
     """Return the outcomes of the light samples, if some of them failed."""
     rows = rows[rows["light"] >= 0]
     found = np.array(outcomes(rows), object)
@@ -106,7 +106,7 @@ def _light_samples(rows: NDArray[Any], names: Names, title: str) -> list[str]:
     return [f"{title}: {', '.join(facts)}"] if facts else []
 
 
-def _cause(outcome: Outcome, rows: NDArray[Any], names: Names) -> str:
+def _cause(outcome: Outcome, rows: NDArray[Any], names: SceneNames) -> str:
     """Return the cause of an outcome, in brackets."""
     if outcome == Outcome.SHADOWED:
         return _bracketed(_hits(rows[rows["blocker"] >= 0], names, names.object, "blocker", "blocker_instance"), "by ")
@@ -117,23 +117,23 @@ def _cause(outcome: Outcome, rows: NDArray[Any], names: Names) -> str:
     return ""
 
 
-def _ends(paths: PixelPaths, names: Names) -> list[str]:
+def _ends(paths: PixelPaths, names: SceneNames) -> list[str]:
     """Return why the paths end."""
-    ends = Counter(End(end) for end in paths.rows["end"] if end != End.NONE)
-    absorbing = paths.rows[paths.rows["end"] == End.ABSORBED]
+    ends = Counter(PathEnd(end) for end in paths.rows["end"] if end != PathEnd.NONE)
+    absorbing = paths.rows[paths.rows["end"] == PathEnd.ABSORBED]
     materials = _bracketed(_hits(absorbing, names, names.material), "by ")
-    words = {End.ESCAPED: f"escape, but {_beyond(names)}", End.DEPTH: "end at the depth limit",
-             End.ABSORBED: f"are absorbed{materials}", End.ROULETTE: "are ended by Russian roulette",
-             End.SIDE: "are scattered to the wrong side of the surface"}
+    words = {PathEnd.ESCAPED: f"escape, but {_beyond(names)}", PathEnd.DEPTH: "end at the depth limit",
+             PathEnd.ABSORBED: f"are absorbed{materials}", PathEnd.ROULETTE: "are ended by Russian roulette",
+             PathEnd.SIDE: "are scattered to the wrong side of the surface"}
     listed = [f"{'all ' * (count == len(paths.starts))}{count} {words[end]}" for end, count in ends.most_common()]
     return [f"paths: {', '.join(listed)}"]
 
 
-def _beyond(names: Names) -> str:
+def _beyond(names: SceneNames) -> str:
     return f"no light comes from {names.infinite} there" if names.infinite else "the scene has no environment"
 
 
-def _hits(rows: NDArray[Any], names: Names, name: Callable[[int], str], primitive: str = "primitive",
+def _hits(rows: NDArray[Any], names: SceneNames, name: Callable[[int], str], primitive: str = "primitive",
           instance: str = "instance") -> Counter[str]:
     """Return how often each object was hit, keyed by what `name` returns for it."""
     return _counted(names.hits(rows[primitive], rows[instance])[0], name)

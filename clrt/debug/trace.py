@@ -21,7 +21,7 @@ from ..rendering.compile.compile_scene import CompiledScene, compile_scene
 from ..rendering.compile.features import WITH_LIGHT
 from ..rendering.error_estimate.adaptive_sampling import most_planned
 from ..scene.model import RenderSettings, Scene
-from .record import VERTEX, End, vertex_preamble
+from .record import VERTEX, PathEnd, vertex_preamble
 
 #: Maximum records per launch, unless a single sample needs more.
 MOST_RECORDS = 1 << 15
@@ -95,8 +95,8 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
         kernel.set_args(*on_device.scene_arguments, records.buffer, launch[0])
         wait_for(on_device.enqueue(kernel, count))
         paths = records.read(device).reshape(batch, depth)[:count]
-        check_paths(device, int(np.sum(paths["end"][:, 0] == End.LOOPS)), count)
-        length = 1 + np.argmax(paths["end"] != End.NONE, axis=1)
+        check_paths(device, int(np.sum(paths["end"][:, 0] == PathEnd.LOOPS)), count)
+        length = 1 + np.argmax(paths["end"] != PathEnd.NONE, axis=1)
         used = np.arange(depth) < length[:, None]
         rows.append(paths[used])
         lengths.append(length)

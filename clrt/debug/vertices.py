@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .names import Names
+from .names import SceneNames
 from .outcomes import outcomes
-from .record import End
+from .record import PathEnd
 from .trace import PixelPaths
 
 Triple = tuple[float, float, float]
 
-ENDS = {End.ESCAPED: "escaped", End.DEPTH: "depth limit", End.ABSORBED: "absorbed",
-        End.SIDE: "BSDF sample on the wrong side of the surface", End.ROULETTE: "Russian roulette"}
+ENDS = {PathEnd.ESCAPED: "escaped", PathEnd.DEPTH: "depth limit", PathEnd.ABSORBED: "absorbed",
+        PathEnd.SIDE: "BSDF sample on the wrong side of the surface", PathEnd.ROULETTE: "Russian roulette"}
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Vertex:
     end: str | None
 
 
-def vertices(paths: PixelPaths, names: Names, sample: int) -> Iterator[Vertex]:
+def vertices(paths: PixelPaths, names: SceneNames, sample: int) -> Iterator[Vertex]:
     """Yield the vertices of a sample's path."""
     start = paths.starts[sample]
     rows = paths.rows[start:start + paths.lengths[sample]]
@@ -107,7 +107,7 @@ def vertices(paths: PixelPaths, names: Names, sample: int) -> Iterator[Vertex]:
             _triple(row["geometric_normal"]) if hit else None, _triple(row["shading_normal"]) if hit else None,
             _triple(row["throughput"]), _emission(row, names, number),
             _light_sample(row, names, outcome, int(blockers[i])) if row["light"] >= 0 else None, _bsdf_sample(row),
-            ENDS.get(End(row["end"])))
+            ENDS.get(PathEnd(row["end"])))
 
 
 def mis_weight(row: NDArray[Any]) -> float | None:
@@ -118,13 +118,13 @@ def mis_weight(row: NDArray[Any]) -> float | None:
     return float(row["emission"][channel] / whole[channel]) if whole[channel] > 0 else None
 
 
-def _emission(row: NDArray[Any], names: Names, number: int | None) -> Emission | None:
+def _emission(row: NDArray[Any], names: SceneNames, number: int | None) -> Emission | None:
     source = names.infinite if number is None else names.object(number) if row["emitter"] >= 0 else ""
     return Emission(source, _triple(row["radiance"]), mis_weight(row), float(row["emission_clamp"]),
                     _triple(row["emission"] * row["emission_clamp"])) if source else None
 
 
-def _light_sample(row: NDArray[Any], names: Names, outcome: str, blocker: int) -> LightSample:
+def _light_sample(row: NDArray[Any], names: SceneNames, outcome: str, blocker: int) -> LightSample:
     return LightSample(names.light(int(row["light"])), float(row["light_probability"]), _triple(row["light_direction"]),
                        float(row["light_pdf"]), _triple(row["light_radiance"]), _triple(row["light_bsdf"]),
                        float(row["light_weight"]), str(outcome), names.object(blocker) if blocker >= 0 else None,

@@ -22,7 +22,7 @@ MOST_COMPILED = 40
 
 
 @dataclass(eq=False)
-class Shared:
+class SharedContext:
     """A context and its programs.
 
     programs: those used last, by key. ahead: events that are set when another process has compiled a program, by key.
@@ -41,15 +41,15 @@ class Shared:
 
 
 #: Contexts for reuse, by device.
-_shared: dict[int, Shared] = {}
+_shared: dict[int, SharedContext] = {}
 
 
-def shared_by(device: cl.Device) -> Shared:
+def shared_by(device: cl.Device) -> SharedContext:
     """Return the shared context of the device, a new one if there is none or it is worn."""
     if device.int_ptr in _shared and _shared[device.int_ptr].worn:
         del _shared[device.int_ptr]
     if device.int_ptr not in _shared:
-        _shared[device.int_ptr] = Shared(Context([device]))
+        _shared[device.int_ptr] = SharedContext(Context([device]))
     return _shared[device.int_ptr]
 
 

@@ -10,7 +10,7 @@ import pyopencl as cl
 from pyopencl import CommandQueue, Context
 
 from ..errors import DeviceError, UsageError
-from .contexts import Shared, shared_by
+from .contexts import SharedContext, shared_by
 from .discovery.device_info import DeviceInfo
 from .discovery.discover import choose
 from .launches.fork_safety import check_process
@@ -29,7 +29,7 @@ class Device:
 
     info: DeviceInfo
     cl: cl.Device
-    shared: Shared
+    shared: SharedContext
     _queue: CommandQueue
 
     @property

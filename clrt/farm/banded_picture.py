@@ -44,7 +44,7 @@ COMMON = {"scene", "options", "camera", "band"}
 
 
 @dataclass
-class Banded:
+class BandedPicture:
     """An image in bands. order: for the whole image; path: of the manifest, next to which the rows are stored."""
 
     order: PictureOrder

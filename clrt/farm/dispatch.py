@@ -17,7 +17,7 @@ from uuid import uuid4
 from ..awake import watched_clock
 from ..errors import ClrtError, DeviceError, HungError, SceneError
 from .cluster import Cluster, Result
-from .worker_states import BadResult, Member, Run, Source, Task
+from .worker_states import BadResult, WorkerState, RunningTask, TaskSource, Task
 
 #: Minimum seconds between two queries of the workers, also as a multiple of a query's duration; and the wait for
 #: results.
@@ -36,14 +36,14 @@ _log = logging.getLogger(__name__)
 class Dispatch:
     """The workers of a cluster, and their tasks from one source. Raises DeviceError if no usable worker is left."""
 
-    def __init__(self, cluster: Cluster, source: Source) -> None:
+    def __init__(self, cluster: Cluster, source: TaskSource) -> None:
         self.cluster, self._source = cluster, source
-        self.members: dict[str, Member] = {}
-        self.former: list[Member] = []
+        self.members: dict[str, WorkerState] = {}
+        self.former: list[WorkerState] = []
         self.tasks: list[Task] = []
         self._again: deque[Task] = deque()
-        self._runs: dict[str, Run] = {}
-        self._meeting: dict[str, Member] = {}
+        self._runs: dict[str, RunningTask] = {}
+        self._meeting: dict[str, WorkerState] = {}
         self._next_look = self._alone_since = 0.0
         self._told_alone = False
         #: Number of tasks sent.
@@ -77,7 +77,7 @@ class Dispatch:
             if task in self._again:
                 self._again.remove(task)
 
-    def wait_for(self, count: int = 1) -> list[Member]:
+    def wait_for(self, count: int = 1) -> list[WorkerState]:
         """Wait until `count` workers are ready, and return all that are."""
         while True:
             if len(ready := self.ready()) >= count:
@@ -93,11 +93,11 @@ class Dispatch:
         for key, result in self.cluster.hear(TICK):
             self._hear(key, result)
 
-    def everyone(self) -> list[Member]:
+    def everyone(self) -> list[WorkerState]:
         """Return all workers, including those that were lost."""
         return [*self.members.values(), *self.former]
 
-    def ready(self) -> list[Member]:
+    def ready(self) -> list[WorkerState]:
         """Return the workers that can be given tasks, least loaded first."""
         return sorted((member for member in self.members.values() if member.ready), key=lambda each: each.load)
 
@@ -111,7 +111,7 @@ class Dispatch:
         for address in self.members.keys() - there.keys():
             self._part_with(self.members.pop(address))
         for address in there.keys() - self.members.keys():
-            member = self.members[address] = Member(address, there[address])
+            member = self.members[address] = WorkerState(address, there[address])
             function, arguments = self._source.introduction()
             key = f"clrt-meet-{uuid4().hex}"
             self._meeting[key] = member
@@ -135,7 +135,7 @@ class Dispatch:
             _log.warning("%s has %s; waiting", self.cluster.address,
                          "workers, none of which is ready" if hopes else "no worker")
 
-    def _part_with(self, member: Member) -> None:
+    def _part_with(self, member: WorkerState) -> None:
         """Remove a lost worker; the task that it was running may be the cause."""
         member.gone = True
         self.former.append(member)
@@ -171,7 +171,7 @@ class Dispatch:
             self.cluster.is_late(run.key)
             self._begin(run.task, member)
 
-    def _overdue(self) -> list[Run]:
+    def _overdue(self) -> list[RunningTask]:
         """Return the overdue runs of tasks that no other worker runs, the oldest first."""
         rates = [member.rate for member in self.everyone() if member.rate]
         if not rates:
@@ -182,13 +182,13 @@ class Dispatch:
                        if now - run.began > SLOW * run.ahead / (run.member.rate or usual) + SLACK),
                       key=lambda run: run.began)
 
-    def _begin(self, task: Task, member: Member) -> None:
+    def _begin(self, task: Task, member: WorkerState) -> None:
         key = f"clrt-{uuid4().hex}"
         self.cluster.send(member.address, key, task.function, *task.arguments())
         self.sent += 1
         member.load += 1
         member.work += task.work
-        run = Run(key, task, member, time.perf_counter(), member.work)
+        run = RunningTask(key, task, member, time.perf_counter(), member.work)
         task.runs.append(run)
         self._runs[key] = run
 
@@ -204,7 +204,7 @@ class Dispatch:
         elif key in self._runs:
             self._ended(self._runs.pop(key), result)
 
-    def _met(self, member: Member, result: Result) -> None:
+    def _met(self, member: WorkerState, result: Result) -> None:
         try:
             member.facts = result.result().result()
             self._source.meet(member)
@@ -215,14 +215,14 @@ class Dispatch:
         except Exception as error:   # any error is the worker's
             self._refuse(member, error)
 
-    def _refuse(self, member: Member, error: Exception) -> None:
+    def _refuse(self, member: WorkerState, error: Exception) -> None:
         known = isinstance(error, ClrtError | BadResult | RuntimeError)
         told = str(error) if known else f"{type(error).__name__}: {error}"
         if not member.refused:
             _log.warning("%s is excluded: %s", member.name, told)
         member.refused = f"{member.name}: {told}"
 
-    def _ended(self, run: Run, result: Result) -> None:
+    def _ended(self, run: RunningTask, result: Result) -> None:
         task, member = run.task, run.member
         member.load -= 1
         member.work -= task.work
@@ -246,7 +246,7 @@ class Dispatch:
             task.runs.clear()
             self.tasks.remove(task)
 
-    def _failed(self, task: Task, member: Member, error: Exception) -> None:
+    def _failed(self, task: Task, member: WorkerState, error: Exception) -> None:
         """Exclude a worker that failed, and give its task to others, as the worker may be the cause."""
         if isinstance(error, LookupError):
             self.meet_again(member)
@@ -257,7 +257,7 @@ class Dispatch:
             raise DeviceError(f"{task.name} has failed on {task.failures} workers: {error}") from error
         self._repeat(task)
 
-    def meet_again(self, member: Member) -> None:
+    def meet_again(self, member: WorkerState) -> None:
         """Introduce a worker again that has a new process at its address, or has forgotten the scene.
 
         All its queued tasks will fail in the same way.

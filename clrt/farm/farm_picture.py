@@ -23,18 +23,18 @@ from ..errors import ClrtError
 from ..rendering.accumulation.accumulation import Accumulation
 from ..rendering.accumulation.launch_plan import FEWEST_TILES
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
-from ..rendering.accumulation.work_queue import Work
+from ..rendering.accumulation.work_queue import WorkQueue
 from ..rendering.film.film import Film
 from ..rendering.film.tiles import TILE_PIXELS, row_by_row, tile_by_tile
 from ..scene.model import Scene
 from .cluster import Cluster
 from .dispatch import Dispatch
-from .next_pass import Ahead
+from .next_pass import NextPass
 from .orders import Order
 from .serialization import pack
-from .worker_check import Proofs
+from .worker_check import WorkerCheck
 from .worker_request import ask
-from .worker_states import BadResult, Member, Task
+from .worker_states import BadResult, WorkerState, Task
 from .worker_tasks import draw, identity, prepare, render_share
 
 #: Target seconds per task with few workers; with many, more, so that client and scheduler handle at most
@@ -56,18 +56,18 @@ MOST_DROPPED = 0.5
 _log = logging.getLogger(__name__)
 
 
-class FarmPicture(Accumulation):
+class FarmAccumulation(Accumulation):
     """Samples of the order's scene, accumulated by a cluster. pixel: the film's record."""
 
     def __init__(self, cluster: Cluster, order: Order, pixel: np.dtype[Any]) -> None:
         super().__init__(order.scene.render.size)
         tiles = self.work.samples.size
         check_host(tiles * TILE_PIXELS * pixel.itemsize, *self.size)
-        self._ahead = Ahead(np.zeros((tiles, TILE_PIXELS), pixel))
+        self._ahead = NextPass(np.zeros((tiles, TILE_PIXELS), pixel))
         self._inside = _inside(self.size)
         self._parcel = pack(order)
-        self._proofs, self._drops = Proofs(), False
-        self._doubted: dict[Task, tuple[Member, NDArray[Any]]] = {}
+        self._proofs, self._drops = WorkerCheck(), False
+        self._doubted: dict[Task, tuple[WorkerState, NDArray[Any]]] = {}
         self._ended = self._gap = 0.0
         #: Bytes of pixels and tile numbers sent to workers and back.
         self.moved_bytes = 0
@@ -101,7 +101,7 @@ class FarmPicture(Accumulation):
         key, text, arrays = self._parcel.key, self._parcel.text, self._parcel.arrays
         return prepare, (identity(), key, text, list(arrays), *self.dispatch.cluster.put(arrays))
 
-    def meet(self, member: Member) -> None:
+    def meet(self, member: WorkerState) -> None:
         """Compare the worker's proof with the others'."""
         self._proofs.compare(member)
 
@@ -113,7 +113,7 @@ class FarmPicture(Accumulation):
         """Return the tasks to queue per worker: the current, the next, and more to cover the client's absence."""
         return min(MOST_AHEAD, AHEAD + round(self._gap / self._task_seconds))
 
-    def next(self, member: Member) -> Task | None:
+    def next(self, member: WorkerState) -> Task | None:
         """Return a task that takes the target time, or less near the end, so that all workers end at the same time."""
         rates = [each.rate for each in self.dispatch.members.values() if each.ready]
         known = [rate for rate in rates if rate]
@@ -134,7 +134,7 @@ class FarmPicture(Accumulation):
                     len(tiles) * TILE_PIXELS * part.more, render_share,
                     lambda: (self._parcel.key, tiles, part.samples, part.more, pixels))
 
-    def accept(self, task: Task, result: NDArray[Any], member: Member) -> None:
+    def accept(self, task: Task, result: NDArray[Any], member: WorkerState) -> None:
         """Store the pixels in the film if they are plausible."""
         work, part, tiles = task.what
         dropped = check_pixels(result, self._ahead.film[tiles], self._inside[tiles], part.more)
@@ -143,7 +143,7 @@ class FarmPicture(Accumulation):
         self._ahead.take(work, tiles, result)
         self.moved_bytes += result.nbytes
 
-    def _doubt(self, task: Task, result: NDArray[Any], member: Member) -> None:
+    def _doubt(self, task: Task, result: NDArray[Any], member: WorkerState) -> None:
         """Raise BadResult for a worker that drops most samples, unless another got the same result for the task."""
         other, found = self._doubted.pop(task, (None, None))
         if other is None or found is None or found.tobytes() != result.tobytes():
@@ -207,9 +207,9 @@ class FarmPicture(Accumulation):
                 self.work.give_back(task.what[1])
             self._settle()
 
-    def work_left(self) -> Work:
+    def work_left(self) -> WorkQueue:
         """Return the remaining work of the pass, including tasks in flight."""
-        kept = Work(self.work.samples, self.work.then, self.work.tiles, self.work.parts)
+        kept = WorkQueue(self.work.samples, self.work.then, self.work.tiles, self.work.parts)
         for task in self._at_pass:
             kept.give_back(task.what[1])
         return kept
@@ -224,9 +224,9 @@ class FarmPicture(Accumulation):
         """Return the film so far, without tasks in flight, or samples of the next pass."""
         return Film(row_by_row(self._ahead.shown(), self.size))
 
-    def restore(self, film: Film, work: Work) -> None:
+    def restore(self, film: Film, work: WorkQueue) -> None:
         """Resume from a film of this size and the work that produced it."""
-        self.work, self._ahead = work, Ahead(tile_by_tile(film.pixels))
+        self.work, self._ahead = work, NextPass(tile_by_tile(film.pixels))
 
     def shares(self) -> list[dict[str, Any]]:
         """Return each worker's samples and speed."""
@@ -257,7 +257,7 @@ def _inside(size: tuple[int, int]) -> NDArray[np.bool_]:
     return np.asarray(tile_by_tile(np.ones((height, width), bool)))
 
 
-def evenly(most: int, work: Work) -> int:
+def evenly(most: int, work: WorkQueue) -> int:
     """Round `most` samples of a tile's pixels, so that tasks of FEWEST_TILES tiles leave no small rest of a pass."""
     each, samples = max(1, most // FEWEST_TILES), int((work.then - work.samples).max())
     return most if samples <= each else FEWEST_TILES * -(-samples // round(samples / each))

@@ -17,7 +17,7 @@ from ..rendering.renderer import Renderer, State
 from ..scene.model import Camera, Scene
 from ..scene.validation.validate import validate
 from .cluster import Cluster
-from .farm_picture import FarmPicture
+from .farm_picture import FarmAccumulation
 from .orders import Order
 
 #: Device name in a checkpoint before the workers are known.
@@ -30,7 +30,7 @@ class FarmRenderer(Renderer):
     simulated: samples per second of workers that only sleep, to measure the overhead (simulated.py).
     """
 
-    session: FarmPicture
+    session: FarmAccumulation
 
     def __init__(self, scene: Scene, cluster: Cluster, *, simulated: float | None = None,
                  **options: Any) -> None:
@@ -58,10 +58,10 @@ class FarmRenderer(Renderer):
         self.devices = []
         self._lanes, self._selectors = lanes, selectors
 
-    def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> FarmPicture:
+    def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> FarmAccumulation:
         order = Order(self.scene, self.choices, self._lanes, self._planned_spp, self._selectors,
                       self._simulated)
-        picture = FarmPicture(self._cluster, order, self.choices.pixel)
+        picture = FarmAccumulation(self._cluster, order, self.choices.pixel)
         facts = picture.dispatch.wait_for()[0].facts or {}
         self.warnings = PictureWarnings(self.scene, facts["report"]["kernel"]["features"])
         return picture

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rendering.accumulation.work_queue import Part, Work
+from ..rendering.accumulation.work_queue import WorkPart, WorkQueue
 
 
-class Ahead:
+class NextPass:
     """A film (tiles, TILE_PIXELS), some of whose tiles have samples of the pass after the current one.
 
     work: of that pass, None if none is planned; samples: samples per pixel that it adds.
@@ -23,12 +23,12 @@ class Ahead:
 
     def __init__(self, film: NDArray[Any]) -> None:
         self.film = film
-        self.work: Work | None = None
+        self.work: WorkQueue | None = None
         self.samples = 0
 
-    def plan(self, work: Work, samples: int) -> None:
+    def plan(self, work: WorkQueue, samples: int) -> None:
         """Plan the next pass: `samples` more for every pixel after the current work."""
-        self.work, self.samples = Work(work.then), samples
+        self.work, self.samples = WorkQueue(work.then), samples
         self.work.add_to_all(samples)
         self._before = np.zeros_like(self.film)    # uses memory only where it is written to
         self._begun = np.zeros(len(self.film), bool)
@@ -37,16 +37,16 @@ class Ahead:
         """Make the planned pass the current one."""
         self.work = None
 
-    def cut(self, work: Work, most: int, least_tiles: int, most_tiles: int, busy: Sequence[Part],
-            ) -> tuple[Work, Part] | None:
-        """Take the next part of the current work, or of the pass after it (see `Work.cut`)."""
+    def cut(self, work: WorkQueue, most: int, least_tiles: int, most_tiles: int, busy: Sequence[WorkPart],
+            ) -> tuple[WorkQueue, WorkPart] | None:
+        """Take the next part of the current work, or of the pass after it (see `WorkQueue.cut`)."""
         if part := work.cut(most, least_tiles, most_tiles, None, busy):
             return work, part
         if self.work and (part := self.work.cut(most, least_tiles, most_tiles, None, [*busy, *work.parts])):
             return self.work, part
         return None
 
-    def take(self, work: Work, tiles: NDArray[np.uint32], pixels: NDArray[Any]) -> None:
+    def take(self, work: WorkQueue, tiles: NDArray[np.uint32], pixels: NDArray[Any]) -> None:
         """Store the tiles' pixels with more samples, of the current work or of the pass after it."""
         if work is self.work:
             fresh = tiles[~self._begun[tiles]]

@@ -36,7 +36,7 @@ Arrays = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
-class Parcel:
+class Serialized:
     """The pickle, and the arrays that it refers to by digest."""
 
     text: bytes
@@ -48,7 +48,7 @@ class Parcel:
         return hashlib.sha256(self.text).hexdigest()
 
 
-def pack(value: object) -> Parcel:
+def pack(value: object) -> Serialized:
     """Pack scenes, settings and plain values."""
     arrays: Arrays = {}
     digests: dict[int, str] = {}
@@ -56,7 +56,7 @@ def pack(value: object) -> Parcel:
     pickler = _Pickler(written, protocol=5)
     pickler.arrays, pickler.digests = arrays, digests
     pickler.dump(value)
-    return Parcel(written.getvalue(), arrays)
+    return Serialized(written.getvalue(), arrays)
 
 
 def unpack(text: bytes, arrays: Mapping[str, NDArray[Any]]) -> Any:

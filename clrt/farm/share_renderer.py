@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rendering.accumulation.launch_plan import depth_of
-from ..rendering.accumulation.multi_device import Crew, make_team
-from ..rendering.accumulation.work_queue import Part, Work
+from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_team
+from ..rendering.accumulation.work_queue import WorkPart, WorkQueue
 from ..rendering.compile.choices import choices_on
-from ..rendering.compile.scene_compiler import Compiler
+from ..rendering.compile.scene_compiler import SceneCompiler
 from ..rendering.film.tiles import TILE_PIXELS, scattered
 from .orders import Order
 from .worker_devices import about, opened
@@ -30,18 +30,19 @@ class ShareRenderer:
         self.scene, self.selectors = order.scene, order.devices
         settings = order.scene.render
         devices = opened(order.devices)
-        compiled = Compiler(devices).compile(order.scene,
-                                             [choices_on(each, order.asked, order.lanes) for each in devices])
+        compiled = SceneCompiler(devices).compile(order.scene,
+                                                  [choices_on(each, order.asked, order.lanes) for each in devices])
         self._team = make_team(devices, compiled, settings.size, depth_of(settings), settings.seed, order.planned_spp)
-        self._picture = Crew(self._team, settings.size)    # its film uses no memory while it is empty
+        # Its film uses no memory while it is empty.
+        self._picture = MultiDeviceAccumulation(self._team, settings.size)
         self._pixel = compiled[0].choices.pixel
 
     def share(self, tiles: NDArray[np.uint32], first: int, more: int, pixels: NDArray[Any] | None) -> NDArray[Any]:
         """See `remote.render_share`."""
         count = len(tiles)
         film = np.zeros((count, TILE_PIXELS), self._pixel) if pixels is None else np.array(pixels)
-        work = Work(np.full((1, count), first, np.int64))
-        work.take(np.arange(count), [Part(0, count, first, more)])
+        work = WorkQueue(np.full((1, count), first, np.int64))
+        work.take(np.arange(count), [WorkPart(0, count, first, more)])
         with _at_work:
             for _ in self._team.run(work, film, tiles):
                 pass

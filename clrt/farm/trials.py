@@ -19,7 +19,7 @@ from ..bench.rays.cold_start import peak_bytes
 from ..rendering.renderer import Renderer, State
 from ..scene.camera_path import frames, turntable
 from ..scene.model import RenderSettings, Scene
-from .banded_picture import Banded
+from .banded_picture import BandedPicture
 from .cluster import connect, local_cluster
 from .farm_renderer import FarmRenderer
 from .local_processes import Processes
@@ -129,8 +129,8 @@ def huge(scene: Scene, size: tuple[int, int], spp: int, workers: int, path: Path
     """Render a large image of normals, which are cheap, in bands, and measure the client's peak memory."""
     with tempfile.TemporaryDirectory(dir=".") as folder, farm(workers) as processes, \
             connect(processes.address) as cluster:
-        banded = Banded(PictureOrder(scene, {"size": size, "integrator": "normals"}, spp=spp),
-                        Path(folder) / "huge.bands")
+        banded = BandedPicture(PictureOrder(scene, {"size": size, "integrator": "normals"}, spp=spp),
+                               Path(folder) / "huge.bands")
         start = time.perf_counter()
         for _ in banded.render(cluster):
             pass

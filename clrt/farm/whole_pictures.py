@@ -15,8 +15,8 @@ import numpy as np
 from .cluster import Cluster
 from .dispatch import Dispatch
 from .orders import PictureOrder
-from .serialization import Parcel, pack
-from .worker_states import BadResult, Member, Task
+from .serialization import Serialized, pack
+from .worker_states import BadResult, WorkerState, Task
 from .worker_tasks import identity, introduce, render_whole
 
 #: With more images than this left per worker, each worker has the next one queued.
@@ -30,7 +30,7 @@ class WholePictures:
                  devices: tuple[str | int, ...] = ()) -> None:
         self._names, self._order, self._devices = list(reversed(names)), order, devices
         self._results: list[tuple[str, dict[str, Any]]] = []
-        self._common: tuple[PictureOrder, Parcel] | None = None
+        self._common: tuple[PictureOrder, Serialized] | None = None
         self.dispatch = Dispatch(cluster, self)
 
     def results(self) -> Iterator[tuple[str, dict[str, Any]] | None]:
@@ -48,7 +48,7 @@ class WholePictures:
         """Return the call by which a worker reports its devices."""
         return introduce, (identity(), self._devices)
 
-    def meet(self, member: Member) -> None:
+    def meet(self, member: WorkerState) -> None:
         """Accept every worker that passed the introduction."""
 
     def left(self) -> bool:
@@ -59,7 +59,7 @@ class WholePictures:
         """Return 2 while there are plenty of images left, else 1."""
         return 2 if len(self._names) > PLENTY * members else 1
 
-    def next(self, member: Member) -> Task | None:
+    def next(self, member: WorkerState) -> Task | None:
         """Return a task for the next image."""
         if not self._names:
             return None
@@ -70,13 +70,13 @@ class WholePictures:
         return Task((name, set(parcel.arrays)), name, 1.0, render_whole, lambda: (
             identity(), parcel.key, parcel.text, part, list(parcel.arrays), *cluster.put(parcel.arrays)))
 
-    def _packed(self, order: PictureOrder) -> Parcel:
+    def _packed(self, order: PictureOrder) -> Serialized:
         """Pack what most orders have in common, once for all of them."""
         if self._common is None or self._common[0] != order:
             self._common = order, pack(order)
         return self._common[1]
 
-    def accept(self, task: Task, result: dict[str, Any], member: Member) -> None:
+    def accept(self, task: Task, result: dict[str, Any], member: WorkerState) -> None:
         """Store the result until it is handed on. Raises BadResult unless its pixels are finite."""
         if not np.isfinite(result["pixels"]).all():
             raise BadResult("it returned pixels that are not finite")

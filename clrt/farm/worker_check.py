@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .worker_states import BadResult, Member
+from .worker_states import BadResult, WorkerState
 
 #: Relative difference of values allowed between devices that round differently, and the fraction of pixels that may
 #: exceed it.
@@ -18,14 +18,14 @@ KIND = ("name", "platform", "platform_version", "driver")
 _log = logging.getLogger(__name__)
 
 
-class Proofs:
+class WorkerCheck:
     """The first worker's proof, and one for each kind of device."""
 
     def __init__(self) -> None:
-        self._first: tuple[Member, NDArray[Any]] | None = None
-        self._kinds: dict[tuple[str, ...], tuple[Member, NDArray[Any]]] = {}
+        self._first: tuple[WorkerState, NDArray[Any]] | None = None
+        self._kinds: dict[tuple[str, ...], tuple[WorkerState, NDArray[Any]]] = {}
 
-    def compare(self, member: Member) -> None:
+    def compare(self, member: WorkerState) -> None:
         """Raise BadResult if a worker's proof differs from that of its kind, or too much from that of the first worker.
 
         Warns if its kind rounds differently: then the image's last bits depend on which worker renders what.

@@ -12,7 +12,7 @@ from .dispatch import LOST, Dispatch
 if TYPE_CHECKING:
     from distributed import Future
 
-    from .worker_states import Member
+    from .worker_states import WorkerState
 
 
 def ask(dispatch: Dispatch, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -32,7 +32,7 @@ def ask(dispatch: Dispatch, function: Callable[..., Any], *arguments: Any) -> An
                     dispatch.meet_again(member)
 
 
-def _is_there(dispatch: Dispatch, member: Member, answer: Future[Any]) -> bool:
+def _is_there(dispatch: Dispatch, member: WorkerState, answer: Future[Any]) -> bool:
     """Wait for an answer; return False if its worker, or the scheduler, is lost first."""
     while not answer.done():
         if not dispatch.cluster.alive or dispatch.members.get(member.address) is not member:

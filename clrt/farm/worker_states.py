@@ -15,7 +15,7 @@ class BadResult(Exception):
 
 
 @dataclass(eq=False)
-class Member:
+class WorkerState:
     """A worker of the cluster, with its state and speed.
 
     facts: its answer to the introduction, None until it is ready. refused: why it is excluded; silent: whether another
@@ -60,23 +60,23 @@ class Task:
     work: float
     function: Callable[..., Any]
     arguments: Callable[[], tuple[Any, ...]]
-    runs: list[Run] = field(default_factory=list)
+    runs: list[RunningTask] = field(default_factory=list)
     deaths: int = 0
     failures: int = 0
 
 
 @dataclass(eq=False)
-class Run:
+class RunningTask:
     """A task on a worker. key: that it was sent under; ahead: the worker's queued work then, including this task."""
 
     key: str
     task: Task
-    member: Member
+    member: WorkerState
     began: float
     ahead: float
 
 
-class Source(Protocol):
+class TaskSource(Protocol):
     """Where tasks come from, and where their results go."""
 
     def left(self) -> bool:
@@ -88,11 +88,11 @@ class Source(Protocol):
     def introduction(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         """Return the first call for a worker, whose result becomes its `facts`."""
 
-    def meet(self, member: Member) -> None:
+    def meet(self, member: WorkerState) -> None:
         """Accept a worker that is ready. Raises BadResult if it must not be used."""
 
-    def next(self, member: Member) -> Task | None:
+    def next(self, member: WorkerState) -> Task | None:
         """Return a task for this worker, or None for now."""
 
-    def accept(self, task: Task, result: Any, member: Member) -> None:
+    def accept(self, task: Task, result: Any, member: WorkerState) -> None:
         """Accept a result. Raises BadResult if it is implausible."""

@@ -24,8 +24,8 @@ from ..rendering.renderer import Renderer, State
 from ..scene.model import Scene
 from ..threads import Condition, beside
 from .history import History
-from .live_renderer import Asked, LiveRenderer, Superseded
-from .picks import Picks, Thing
+from .live_renderer import ImageRequest, LiveRenderer, Superseded
+from .picks import PickRequests, Thing
 from .settings import Selector, Settings
 from .snapshot import Snapshot
 
@@ -45,13 +45,13 @@ class Live:
                  settings: Settings = Settings()) -> None:
         if device is not None:
             settings = replace(settings, device=device)
-        self._asked = self._current = Asked(1, scene, settings, False)
+        self._asked = self._current = ImageRequest(1, scene, settings, False)
         size = self._asked.size
         black = np.zeros((size[1], size[0], 3), np.float32)
         self._snapshot = Snapshot(scene=scene, settings=settings, pixels=black, size=size)
         self._still: tuple[Renderer, State] | None = None
         self._times: deque[float] = deque(maxlen=64)
-        self._history, self._picks = History(), Picks()
+        self._history, self._picks = History(), PickRequests()
         self._lock, self._changed = RLock(), Condition()
         self._closed = False
         self._unseen = True     # no image of the current request has been published
@@ -170,7 +170,7 @@ class Live:
 
     def _work(self) -> None:
         """Render the newest request, until closed. Runs in the thread."""
-        last: Asked | None = None
+        last: ImageRequest | None = None
         while (asked := self._next(last)) is not None:
             try:
                 if asked is last:
@@ -186,13 +186,13 @@ class Live:
                 _log.exception("rendering an image failed")
                 self._publish(asked=asked.number, error=f"{type(error).__name__}: {error}", phase="rest")
 
-    def _next(self, last: Asked | None) -> Asked | None:
+    def _next(self, last: ImageRequest | None) -> ImageRequest | None:
         """Wait for a request other than the last, or for picks in the last, and return it; None when closed."""
         self._changed.wait_for(lambda: self._closed or bool(self._picks) or self._asked is not last)
         with self._lock:    # else the newest request could be abandoned along with the last
             return None if self._closed else self._asked
 
-    def _show(self, asked: Asked) -> None:
+    def _show(self, asked: ImageRequest) -> None:
         """Render a request to its end, first at reduced size if the full size would take too long."""
         self._unseen = True
         quick = self._renderer.quick_size(asked)
@@ -204,7 +204,7 @@ class Live:
         self._render(asked, asked.size, asked.scene.render.spp)
         self._publish(phase="rest")
 
-    def _render(self, asked: Asked, size: tuple[int, int], spp: int) -> None:
+    def _render(self, asked: ImageRequest, size: tuple[int, int], spp: int) -> None:
         if self._is_superseded(asked):
             raise Superseded
         self._current, self._still = asked, None
@@ -219,12 +219,12 @@ class Live:
         if self._is_superseded(asked):
             raise Superseded
 
-    def _is_denoised(self, asked: Asked, size: tuple[int, int]) -> bool:
+    def _is_denoised(self, asked: ImageRequest, size: tuple[int, int]) -> bool:
         """Return whether the image is denoised: it must show light and have the full size."""
         light = asked.scene.render.integrator in INTEGRATORS
         return asked.settings.denoise and light and size == asked.size and not self._is_superseded(asked)
 
-    def _is_superseded(self, asked: Asked) -> bool:
+    def _is_superseded(self, asked: ImageRequest) -> bool:
         """Return whether something newer is to be shown instead; during a movement the current image is shown first, as
         otherwise nothing would be shown until it ends."""
         newest = self._asked
@@ -235,7 +235,7 @@ class Live:
             raise Superseded
         self._publish(phase=phase)
 
-    def _publish_picture(self, asked: Asked, state: State) -> None:
+    def _publish_picture(self, asked: ImageRequest, state: State) -> None:
         renderer = self._renderer.renderer
         assert renderer is not None
         now = time.perf_counter()

@@ -15,7 +15,7 @@ from ..output.denoise import Denoiser
 from ..rendering.accumulation.denoiser_guides import render_guides
 from ..rendering.renderer import Renderer, State
 from ..scene.model import Scene
-from .pace import Pace
+from .image_sizing import ImageSizing
 from .picks import Thing
 from .settings import Selector, Settings
 
@@ -24,7 +24,7 @@ from .settings import Selector, Settings
 DENOISING = 0.25
 
 
-class Asked(NamedTuple):
+class ImageRequest(NamedTuple):
     """Request of an image. number: of the edit or choice; moving: more requests of its kind follow immediately."""
 
     number: int
@@ -52,7 +52,7 @@ class LiveRenderer:
         self._on_phase = on_phase
         self._devices: list[Device] = []
         self._selector: object = self     # equal to no selector
-        self._pace = Pace()
+        self._pace = ImageSizing()
         self.renderer: Renderer | None = None
         #: Number of program changes.
         self.programs = 0
@@ -63,12 +63,12 @@ class LiveRenderer:
         self._met: NDArray[np.generic] = np.zeros((0, 0), np.int32)    # object numbers per pixel
         self._met_by: Renderer | None = None    # renderer of these numbers
 
-    def quick_size(self, asked: Asked) -> tuple[int, int]:
+    def quick_size(self, asked: ImageRequest) -> tuple[int, int]:
         """Return the image size that meets the target frame rate during movements; the full size if that does."""
         rate = asked.settings.frame_rate
         return self._pace.size(asked.size, asked.settings.samples, 1 / rate) if rate else asked.size
 
-    def states(self, asked: Asked, size: tuple[int, int], spp: int) -> Iterator[State]:
+    def states(self, asked: ImageRequest, size: tuple[int, int], spp: int) -> Iterator[State]:
         """Yield the image's states with increasing sample counts, up to `spp`."""
         start = time.perf_counter()
         self._guided = self._met_by = None
@@ -108,7 +108,7 @@ class LiveRenderer:
         return pixels
 
     def seen_at(self, x: float, y: float) -> Thing | None:
-        """Return the first hit at a position (see `Picks`), at a pixel's centre."""
+        """Return the first hit at a position (see `PickRequests`), at a pixel's centre."""
         renderer = self.renderer
         if renderer is None:
             return None

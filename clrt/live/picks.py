@@ -11,7 +11,7 @@ from ..scene.model import Instance, Mesh, Sphere
 Thing = Mesh | Instance | Sphere
 
 
-class Picks:
+class PickRequests:
     """Picking requests that are not answered yet."""
 
     def __init__(self) -> None:

@@ -26,7 +26,7 @@ from ..device.programs.struct_types import record
 from ..errors import DeviceError, UsageError, check_choice
 from ..float_errors import with_default_errors
 from ..scene.geometry.ray_arrays import Rays, ray_arrays
-from ..scene.geometry.scaling import Frame
+from ..scene.geometry.scaling import SceneFrame
 
 HIT = record(t="f4", primitive="i4", u="f4", v="f4")
 INSTANCE_HIT = record(t="f4", primitive="i4", u="f4", v="f4", instance="i4", pad="3i4")
@@ -62,7 +62,7 @@ class TreeQuery:
     query opens its device by the same selector, and returns the same results.
     """
 
-    def __init__(self, device: Device, tree: Layout, counts: tuple[int, int], frame: Frame, tests: HitTests,
+    def __init__(self, device: Device, tree: Layout, counts: tuple[int, int], frame: SceneFrame, tests: HitTests,
                  traversal: str | None, selector: str | int | None = None) -> None:
         """Create a query for a BVH over `counts`, the numbers of triangles and spheres, in `frame`. selector: the
         argument that opened the device."""
@@ -96,7 +96,7 @@ class TreeQuery:
         self.device, self._lock, self._kernels = open_device(self._selector), threading.Lock(), {}
         self._use(self.tree, self.frame)
 
-    def _use(self, tree: Layout, frame: Frame) -> None:
+    def _use(self, tree: Layout, frame: SceneFrame) -> None:
         """Upload a BVH and use it from now on."""
         buffers = {name: resident(self.device, array) for name, array in tree.buffers.items()}
         tree, scene = replace(tree, buffers=buffers), [array.buffer for array in buffers.values()]

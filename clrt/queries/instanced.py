@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..accel.layouts import Layout
 from ..accel.traversal_kernels import HitTests
-from ..accel.two_level import TwoLevels
+from ..accel.two_level import TwoLevelBvh
 from ..device.open import open_device
 from ..errors import SceneError
 from ..float_errors import with_default_errors
 from ..scene.geometry.mesh_arrays import mesh_arrays
-from ..scene.geometry.scaling import Frame, frame_around, unit_for
+from ..scene.geometry.scaling import SceneFrame, frame_around, unit_for
 from ..scene.geometry.transform import transform_faults
 from ..scene.validation.number_arrays import real_array, whole_array
 from .base import TreeQuery
@@ -46,9 +46,9 @@ class InstancedRayQuery(TreeQuery):
         self._units = np.array([unit_for(largest) for largest in self._extents.max(axis=1).tolist()])
         to_world = _matrices(transforms, len(self._mesh))
         tests, opened = HitTests(triangle, box), open_device(device)
-        self._levels = TwoLevels(opened, opened.layout if layout is None else layout, builder,
-                                 [(mesh_corners * unit).astype(np.float32)
-                                  for mesh_corners, unit in zip(triangles, self._units)], self._mesh, triangle)
+        self._levels = TwoLevelBvh(opened, opened.layout if layout is None else layout, builder,
+                                   [(mesh_corners * unit).astype(np.float32)
+                                    for mesh_corners, unit in zip(triangles, self._units)], self._mesh, triangle)
         tree, frame = self._placed(to_world)
         super().__init__(opened, tree, (sum(map(len, triangles)), 0), frame, tests, traversal, device)
 
@@ -69,7 +69,7 @@ class InstancedRayQuery(TreeQuery):
         """
         self._use(*self._placed(_matrices(transforms, len(self._mesh))))
 
-    def _placed(self, to_world: Doubles) -> tuple[Layout, Frame]:
+    def _placed(self, to_world: Doubles) -> tuple[Layout, SceneFrame]:
         """Build the BVH over the instances, and return it with the world's frame; each mesh has its own length unit."""
         reach = np.einsum("kij,kj->ki", np.abs(to_world[..., :3]), self._extents[self._mesh])
         low, high = to_world[..., 3] - reach, to_world[..., 3] + reach

@@ -16,7 +16,7 @@ from ..errors import SceneError
 from ..float_errors import with_default_errors
 from ..scene.geometry.mesh_arrays import finite_points, mesh_arrays, sphere_array
 from ..scene.geometry.ray_arrays import Rays
-from ..scene.geometry.scaling import Frame, frame_around
+from ..scene.geometry.scaling import SceneFrame, frame_around
 from .base import TreeQuery
 
 
@@ -86,7 +86,7 @@ class RayQuery(TreeQuery):
             self.refit(self._moving)
         return super()._ask(name, rays, answers)
 
-    def _built(self, device: Device, points: NDArray[np.floating], triangle: str) -> tuple[Layout, Frame]:
+    def _built(self, device: Device, points: NDArray[np.floating], triangle: str) -> tuple[Layout, SceneFrame]:
         """Build a BVH for that triangle test, and return it with its frame."""
         frame = frame_around(*_bounds(points[self._faces], self._spheres))
         spheres = np.hstack([frame.points(self._spheres[:, :3]), self._spheres[:, 3:] * np.float32(frame.unit)])
@@ -96,9 +96,10 @@ class RayQuery(TreeQuery):
     def _comfortable(self, points: NDArray[np.floating]) -> bool:
         """Return whether the BVH's frame still suits the mesh."""
         moved = self.frame.points(points)
-        if frame_around(*_bounds(moved[:, None], self._spheres)) == Frame():
+        if frame_around(*_bounds(moved[:, None], self._spheres)) == SceneFrame():
             return True
-        return frame_around(*_bounds(moved[self._faces], self._spheres)) == Frame()  # ignores vertices without a face
+        # Ignores vertices without a face.
+        return frame_around(*_bounds(moved[self._faces], self._spheres)) == SceneFrame()
 
 
 def _bounds(triangles: NDArray[np.floating], spheres: NDArray[np.float32]) -> tuple[NDArray[np.floating], ...]:

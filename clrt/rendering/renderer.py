@@ -25,20 +25,20 @@ from .accumulation.multi_device import make_picture
 from .accumulation.scene_on_device import SceneOnDevice
 from .aovs import Aovs
 from .checkpoint.checkpoints import check_of_none, open_checkpoints
-from .checkpoint.saved_state import Kept
+from .checkpoint.saved_state import SavedState
 from .compile.camera_kernel import camera_file
 from .compile.choices import choices_on
 from .compile.compile_scene import CompiledScene
-from .compile.scene_compiler import Compiler
+from .compile.scene_compiler import SceneCompiler
 from .error_estimate.adaptive_sampling import most_planned
 from .error_estimate.convergence import Convergence
 from .film.film import Film
 from .film.state import State as State, check_reference
 from .render_warnings import PictureWarnings
 from .renderer_options import choices_of, settings_of
-from .state_interval import Pace
-from .stop_conditions import Limits, check_stops, checked_percentile
-from .thread_turns import Turns
+from .state_interval import StateInterval
+from .stop_conditions import StopConditions, check_stops, checked_percentile
+from .thread_turns import ThreadTurns
 
 
 class Renderer:
@@ -47,14 +47,13 @@ class Renderer:
     device: see `clrt devices`, or an open device; several render one image together. size: (width, height); triangle,
     box, sphere: see `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: planned
     samples per pixel: the sampler makes neighbouring pixels' errors differ at this count and starts afresh after it
-    (kernels/sampler); `passes` stops there by default. adaptive: distribute samples over tiles by estimated error.
-    on_phase is called with "build" (packing, BVH build) and "compile" (program build, upload) as each begins.
-    checkpoint: a file updated while rendering, about every `checkpoint_seconds` and at the end; resume: continue from
-    it, with the `spp` planned then, or start afresh if it does not exist yet (docs/checkpoints.md). error_percentile: a
-    target error counts as reached once this percentage of the 8 x 8 pixel tiles has reached it. before: a renderer no
-    longer needed; its device resources are reused as far as its scene consists of the same objects, which must not have
-    been modified in place. aovs: names of AOVs to render as well (docs/aovs.md). first_hits: whether denoiser guides or
-    first-hit AOVs will be requested later. Raises subclasses of ClrtError.
+    (kernels/sampler); `passes` stops there. adaptive: more samples for tiles of larger error. on_phase is called with
+    "build" (packing, BVH build) and "compile" (program build, upload) as each begins. checkpoint: a file updated while
+    rendering, about every `checkpoint_seconds` and at the end; resume: continue from it if it exists, with the `spp`
+    planned then (docs/checkpoints.md). error_percentile: a target error counts as reached once this percentage of the 8
+    x 8 pixel tiles has reached it. before: a renderer no longer needed; its device resources are reused as far as its
+    scene consists of the same objects, unmodified. aovs: names of AOVs to render as well (docs/aovs.md). first_hits:
+    whether denoiser guides or first-hit AOVs will be requested later. Raises subclasses of ClrtError.
     """
 
     @with_default_errors
@@ -83,7 +82,7 @@ class Renderer:
         self._planned_spp = kept.planned_spp if kept else most_planned(spp, self.settings.adaptive)
         self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
-        self._interrupted, self._abandoned, self._turns = False, Event(), Turns()
+        self._interrupted, self._abandoned, self._turns = False, Event(), ThreadTurns()
         self._asked_for: Camera | None = None
         if kept:
             self._convergence.restore(kept)
@@ -96,7 +95,7 @@ class Renderer:
         """Open the devices and compile the scene for them; without `lanes` each uses its preferred SIMD width."""
         self.device, *_ = self.devices = open_devices(device)
         on_phase("build")
-        self._compiler: Compiler = Compiler.after(before._compiler if before else None, self.devices)
+        self._compiler: SceneCompiler = SceneCompiler.after(before._compiler if before else None, self.devices)
         choices = [choices_on(each, self.choices, lanes) for each in self.devices]
         self._compiled = self._compiler.compile(self.scene, choices, ahead=len(choices) == 1)
         self.warnings = PictureWarnings(self.scene, self.compiled.features)
@@ -171,7 +170,7 @@ class Renderer:
         check_reference(reference, self.session.size)
         try:
             with watched_clock(self.seconds) as watch:
-                limits = Limits.of(self.settings, spp, time, error)
+                limits = StopConditions.of(self.settings, spp, time, error)
                 yield from self._turns.of(self._passes(limits, reference, watch))
         except (GeneratorExit, KeyboardInterrupt):
             self._keep_unfinished()
@@ -180,12 +179,13 @@ class Renderer:
             if self._checkpoints is not None:
                 self._checkpoints.wait()
 
-    def _passes(self, limits: Limits, reference: NDArray[np.float32] | None, watch: AwakeClock) -> Iterator[State]:
+    def _passes(self, limits: StopConditions, reference: NDArray[np.float32] | None,
+                watch: AwakeClock) -> Iterator[State]:
         self._see()
         self.session.mend()
         if self._catch_up(limits):
             yield self.state(reference)
-        pace, begun = Pace(), None
+        pace, begun = StateInterval(), None
         while self.stop_reason is None:
             launches, begun = begun or self._next_pass(limits), None
             self._run_pass(launches, limits, watch)
@@ -244,7 +244,7 @@ class Renderer:
         """Return the AOVs of a state by name, in the order in which they were requested."""
         return self._aovs.of(state.film)
 
-    def _catch_up(self, limits: Limits) -> bool:
+    def _catch_up(self, limits: StopConditions) -> bool:
         """Record what history lacks; return whether an earlier call or the resumed checkpoint met a stop condition."""
         self._convergence.catch_up(self.session, self.seconds)
         done = self.session.samples_done
@@ -254,7 +254,7 @@ class Renderer:
             self.stop_reason = "error"
         return self.stop_reason is not None
 
-    def _next_pass(self, limits: Limits) -> Iterator[None]:
+    def _next_pass(self, limits: StopConditions) -> Iterator[None]:
         """Return a pass over the whole image, or an adaptive one that doubles the samples of the tiles where that
         reduces the error most. Stop the render if no tile is left."""
         if not limits.adapts(self.session.samples_done):
@@ -263,7 +263,7 @@ class Renderer:
             self.stop_reason = "spp"
         return self.session.double(tiles)
 
-    def _run_pass(self, launches: Iterator[None], limits: Limits, watch: AwakeClock) -> None:
+    def _run_pass(self, launches: Iterator[None], limits: StopConditions, watch: AwakeClock) -> None:
         """Run one pass; set the stop reason if `time` is over or the render is interrupted, even inside the pass."""
         for _ in launches:
             self.seconds = watch.seconds
@@ -289,8 +289,8 @@ class Renderer:
         """Write a checkpoint if one is due, or start writing the last one; film: the current film, if known."""
         if self._checkpoints is not None and (last or self._checkpoints.due):
             write = self._checkpoints.begin if last else self._checkpoints.write
-            write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(),
-                       self.session.work_left(), self._convergence.noise))
+            write(SavedState(self._planned_spp, self.seconds, self.history, film or self.session.film(),
+                             self.session.work_left(), self._convergence.noise))
 
     def _keep_unfinished(self) -> None:
         """Write a checkpoint if `passes` is left before its end, unless the render is abandoned or the device fails."""

@@ -8,7 +8,7 @@ import time
 STATE_SECONDS, STATE_COST = 0.5, 20
 
 
-class Pace:
+class StateInterval:
     """Timer for the states of one call of `passes`; the first one is due at once."""
 
     def __init__(self) -> None:

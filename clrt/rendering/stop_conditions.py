@@ -44,7 +44,7 @@ def checked_percentile(percentile: Any) -> float | None:
 
 
 @dataclass(frozen=True)
-class Limits:
+class StopConditions:
     """Stop conditions of a render, each None or given; adaptive: whether the tiles' errors distribute samples."""
 
     spp: int | None
@@ -53,9 +53,9 @@ class Limits:
     adaptive: bool
 
     @staticmethod
-    def of(settings: RenderSettings, spp: int | None, time: float | None, error: float | None) -> Limits:
+    def of(settings: RenderSettings, spp: int | None, time: float | None, error: float | None) -> StopConditions:
         """Return the stop conditions given, or else the scene's sample count. Raises UsageError like `check_stops`."""
-        return Limits(planned_spp(settings, spp, time, error), time, error, settings.adaptive)
+        return StopConditions(planned_spp(settings, spp, time, error), time, error, settings.adaptive)
 
     def reached(self, done: int, seconds: float) -> str | None:
         """Return the stop reason if an image has reached the sample count or the time already, else None."""

@@ -12,7 +12,7 @@ from ..float_errors import default_errors
 T = TypeVar("T")
 
 
-class Turns:
+class ThreadTurns:
     """Reentrant lock of one renderer."""
 
     def __init__(self) -> None:

@@ -16,7 +16,7 @@ from .panels import materials, render, spheres, statistics
 from .panels.camera import CameraPanel
 from .panels.files import Files
 from .panels.lights import Lights
-from .tone_mapping import Look as Look
+from .tone_mapping import DisplaySettings as DisplaySettings
 from .viewport import Viewport
 
 SIZE = (1280, 800)
@@ -28,7 +28,8 @@ ADD_ONS = immapp.AddOnsParams(with_implot=True)
 class App:
     """A window on a live session of its own. `params`: the parameters of Dear ImGui's runner."""
 
-    def __init__(self, scene: Scene, settings: Settings = Settings(), look: Look = Look()) -> None:
+    def __init__(self, scene: Scene, settings: Settings = Settings(),
+                 look: DisplaySettings = DisplaySettings()) -> None:
         # Before OpenGL is loaded: libraries loaded later would get Mesa's LLVM, and PoCL aborts with a foreign one.
         devices = [info for info, _ in find_devices() if info.usable]
         self.live = Live(scene, settings=settings)

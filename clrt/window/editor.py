@@ -30,7 +30,7 @@ from ..scene.model import Source
 from .camera_controls import CameraControls
 from .navigation import around, distance
 from .screenshot import screenshot
-from .tone_mapping import Look, ToneMapper
+from .tone_mapping import DisplaySettings, ToneMapper
 
 _log = logging.getLogger(__name__)
 #: Titles of panels.
@@ -46,7 +46,7 @@ class Editor:
     the number of frames drawn; moving_light: index of the light that circles around the camera's look_at point; sphere,
     material: index and name of those being edited."""
 
-    def __init__(self, live: Live, look: Look, devices: Sequence[DeviceInfo]) -> None:
+    def __init__(self, live: Live, look: DisplaySettings, devices: Sequence[DeviceInfo]) -> None:
         self.live, self.look, self.devices = live, look, devices
         self.tone_mapper, self.controls = ToneMapper(), CameraControls()
         self.message, self.frames = "", 0

@@ -37,7 +37,7 @@ LARGEST = 2**31 - 1
 COLOR = imgui.ColorEditFlags_.float.value | imgui.ColorEditFlags_.hdr.value
 
 
-class Limits(NamedTuple):
+class NumberLimits(NamedTuple):
     """Minimum and maximum of a number."""
 
     least: float = -inf
@@ -119,7 +119,7 @@ def _edit_tuple(label: str, kinds: tuple[Any, ...], value: tuple[Any, ...], step
         return new if any(a is not b for a, b in zip(new, value)) else value
     if _base(kinds[0]) is int:
         changed, parts = getattr(imgui, f"drag_int{len(kinds)}")(label, value)
-    elif len(kinds) == 3 and limits[0] in (Limits(0, 1), Limits(0)):
+    elif len(kinds) == 3 and limits[0] in (NumberLimits(0, 1), NumberLimits(0)):
         changed, parts = imgui.color_edit3(label, value, COLOR)
     else:
         drag = getattr(imgui, f"drag_float{len(kinds)}")
@@ -132,7 +132,7 @@ def _edit_tuple(label: str, kinds: tuple[Any, ...], value: tuple[Any, ...], step
 
 def _number(hint: Any, step: float, label: str, value: float) -> tuple[bool, float]:
     """Show a slider if the type has limits, otherwise a drag widget."""
-    limits = limits_of(hint) or Limits()
+    limits = limits_of(hint) or NumberLimits()
     least, most = limits.least, USUAL.get(label, limits.most)
     slides, whole = isfinite(least) and most - least <= WIDEST, _base(hint) is int
     flags = imgui.SliderFlags_.logarithmic.value if most - least > WIDE else 0
@@ -148,11 +148,11 @@ def _number(hint: Any, step: float, label: str, value: float) -> tuple[bool, flo
     return changed, _shortest(limits.clamp(new), hint)
 
 
-def limits_of(hint: Any) -> Limits | None:
+def limits_of(hint: Any) -> NumberLimits | None:
     """Return the limits of a number's type; None for other types."""
     if _base(hint) not in (int, float):
         return None
-    limits = Limits()
+    limits = NumberLimits()
     for limit in getattr(hint, "__metadata__", ()):
         if isinstance(limit, Ge | Gt):
             least = limit.bound if isinstance(limit, Ge) else _next(limit.bound, inf, hint)
@@ -175,7 +175,7 @@ def _initial(hint: Any) -> Any:
     """Return the initial value of an optional field that becomes enabled: 1, or the nearest allowed."""
     if get_origin(hint) is tuple:
         return tuple(map(_initial, get_args(hint)))
-    return _shortest((limits_of(hint) or Limits()).clamp(1), hint)
+    return _shortest((limits_of(hint) or NumberLimits()).clamp(1), hint)
 
 
 def _is(kind: Any, value: Any) -> bool:

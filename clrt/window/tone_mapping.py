@@ -15,7 +15,7 @@ from ..threads import Condition, beside
 
 
 @dataclass(frozen=True)
-class Look:
+class DisplaySettings:
     """Display settings: a view transform (docs/colour.md) after a gain of 2^exposure."""
 
     view: str = "srgb"
@@ -27,7 +27,7 @@ class ToneMapped:
     """rgba: (height, width, 4) uint8 of a snapshot with `look` applied; error: why that failed, with black pixels."""
 
     snapshot: Snapshot
-    look: Look
+    look: DisplaySettings
     rgba: NDArray[np.uint8]
     error: str | None = None
 
@@ -36,12 +36,12 @@ class ToneMapper:
     """Background tone mapper. Only the latest request is processed next; older pending ones are dropped."""
 
     def __init__(self) -> None:
-        self._asked: tuple[Snapshot, Look] | None = None
+        self._asked: tuple[Snapshot, DisplaySettings] | None = None
         self._changed, self._closed = Condition(), False
         self.newest: ToneMapped | None = None
         self._wait_for_end = beside(self._run, daemon=True)
 
-    def ask(self, snapshot: Snapshot, look: Look) -> None:
+    def ask(self, snapshot: Snapshot, look: DisplaySettings) -> None:
         """Request tone mapping of a snapshot, unless it is already the latest request."""
         if self._asked is None or self._asked[0] is not snapshot or self._asked[1] != look:
             self._asked = snapshot, look
@@ -63,7 +63,7 @@ class ToneMapper:
             self.newest = tone_mapped(*done)
 
 
-def tone_mapped(snapshot: Snapshot, look: Look) -> ToneMapped:
+def tone_mapped(snapshot: Snapshot, look: DisplaySettings) -> ToneMapped:
     """Return the image as `clrt render --view --exposure` writes it to a .png."""
     data, error = shown_data(snapshot.scene.render.integrator, snapshot.pixels), None
     try:

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.accel.build import build_tree
-from clrt.accel.bvh import FloatArray, Tree, half_area
+from clrt.accel.bvh import FloatArray, Bvh, half_area
 from clrt.accel.device_builder import SHAPES, program_source
 from clrt.accel.layouts import Layout, sphere_boxes
 from clrt.accel.morton import sort_primitives
 from clrt.accel.ploc import BINARY_NODE, cluster
 from clrt.accel.reinsertion import reinsert
-from clrt.accel.wide import EMPTY, Wide, leaf_fields, leaf_reference
-from clrt.device.launches.data_parallel import Blocks
+from clrt.accel.wide import EMPTY, WideBvh, leaf_fields, leaf_reference
+from clrt.device.launches.data_parallel import DataParallel
 from clrt.device.launches.device_arrays import on_host
 from clrt.device.open import Device
 
@@ -36,7 +36,7 @@ def built(device: Device, layout: str, case: str) -> Layout:
     return replace(tree, buffers={name: on_host(device, array) for name, array in tree.buffers.items()})
 
 
-def wide_tree(device: Device, layout: str, case: str) -> Wide:
+def wide_tree(device: Device, layout: str, case: str) -> WideBvh:
     """Return a BVH8 with leaves numbered by their first lane, or a CWBVH with primitives numbered as in the records.
 
     The boxes of a CWBVH are recomputed from what is below each slot.
@@ -50,26 +50,26 @@ def wide_tree(device: Device, layout: str, case: str) -> Wide:
                 child[index, slot] = below
             for slot, start, size in leaves_of(node):
                 child[index, slot] = ~(start << 4 | (start >= triangle_count) << 3 | size - 1)
-        return Wide(*boxes_below(tree), child, np.zeros(1, np.int32), order)
+        return WideBvh(*boxes_below(tree), child, np.zeros(1, np.int32), order)
     child = nodes["child"].copy()
     first, sphere, count = leaf_fields(child[child < 0])
     child[child < 0] = leaf_reference(np.where(sphere, first, 8 * first).astype(np.int32), sphere, count)
     if "packs" in tree.buffers:
         order = tree.buffers["packs"]["primitive"].ravel()
     balls = tree.buffers["leaf_spheres"]["primitive"] if "leaf_spheres" in tree.buffers else order[:0]
-    return Wide(nodes["lo"].transpose(0, 2, 1), nodes["hi"].transpose(0, 2, 1), child, order,
-                balls - np.int32(triangle_count))
+    return WideBvh(nodes["lo"].transpose(0, 2, 1), nodes["hi"].transpose(0, 2, 1), child, order,
+                   balls - np.int32(triangle_count))
 
 
-def binary_tree(device: Device, case: str) -> Tree:
+def binary_tree(device: Device, case: str) -> Bvh:
     """Return the BVH2; sphere leaves are stored like triangle leaves, and follow them in `order`."""
     buffers, triangle_count = built(device, "bvh2", case).buffers, len(SCENES[case][0])
     nodes = np.delete(buffers["nodes"], 1)
     shift = np.where(nodes["count"] == 0, -1, np.where(nodes["count"] < 0, triangle_count, 0))
     leaves = [buffers[name]["primitive"] for name in ("leaf_triangles", "leaf_spheres") if name in buffers]
     order = np.concatenate(leaves)
-    return Tree(nodes["aabb_min"], nodes["aabb_max"], (nodes["left_first"] + shift).astype(np.int32),
-                np.abs(nodes["count"]), np.zeros(len(nodes), bool), order, order[:0])
+    return Bvh(nodes["aabb_min"], nodes["aabb_max"], (nodes["left_first"] + shift).astype(np.int32),
+               np.abs(nodes["count"]), np.zeros(len(nodes), bool), order, order[:0])
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Binary:
 def binary(device: Device, layout: str, case: str, passes: int = 0) -> Binary:
     """Return the binary BVH of a scene for a layout, after some passes of reinsertion."""
     triangles, balls = SCENES[case]
-    work = Blocks(device, program_source(SHAPES[layout], len(triangles) > 0, len(balls) > 0, passes > 0))
+    work = DataParallel(device, program_source(SHAPES[layout], len(triangles) > 0, len(balls) > 0, passes > 0))
     primitives = sort_primitives(work, triangles, balls)
     tree = cluster(work, primitives)
     tree = reinsert(work, primitives, tree, passes) if passes else tree

@@ -13,15 +13,15 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from clrt.accel.builders import BUILDERS, midpoint, sah
-from clrt.accel.bvh import FloatArray, Tree, half_area, join
+from clrt.accel.bvh import FloatArray, Bvh, half_area, join
 
 from .cases import NASTY, grid, soup, spheres
 
-Builder = Callable[[FloatArray, FloatArray, int, int], Tree]
+Builder = Callable[[FloatArray, FloatArray, int, int], Bvh]
 CONFIGURATIONS = [("sah", 4, 1), ("sah", 8, 8), ("sah", 1, 1), ("midpoint", 2, 1), ("midpoint", 8, 8)]
 
 
-def check(tree: Tree, low: FloatArray, high: FloatArray, leaf_size: int, free_depth: int = 40) -> None:
+def check(tree: Bvh, low: FloatArray, high: FloatArray, leaf_size: int, free_depth: int = 40) -> None:
     """Assert that the BVH over boxes (p, 3) is valid and not too deep."""
     count, nodes = len(low), len(tree.count)
     assert nodes <= max(2 * count - 1, 1)
@@ -139,10 +139,10 @@ def test_joined_trees_keep_their_leaves(triangle_count: int, sphere_count: int) 
     ball_low, ball_high = balls[:, :3] - balls[:, 3:], balls[:, :3] + balls[:, 3:]
     tree = join(sah(low, high, 4), midpoint(ball_low, ball_high))
     # With the spheres renumbered after the triangles, the joined BVH is a valid BVH over both.
-    both = Tree(tree.aabb_min, tree.aabb_max,
-                np.where(tree.spheres, tree.left_first + triangle_count, tree.left_first).astype(np.int32), tree.count,
-                tree.spheres, np.concatenate([tree.order, tree.sphere_order + triangle_count]).astype(np.int32),
-                tree.sphere_order[:0])
+    both = Bvh(tree.aabb_min, tree.aabb_max,
+               np.where(tree.spheres, tree.left_first + triangle_count, tree.left_first).astype(np.int32), tree.count,
+               tree.spheres, np.concatenate([tree.order, tree.sphere_order + triangle_count]).astype(np.int32),
+               tree.sphere_order[:0])
     check(both, np.concatenate([low, ball_low]), np.concatenate([high, ball_high]), 4)
     assert not tree.spheres[tree.count == 0].any()
     assert tree.count[tree.spheres].sum() == sphere_count

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from clrt.accel import ploc
 from clrt.accel.bvh import FloatArray, half_area, intersections
-from clrt.accel.device_builder import SHAPES, Shape, program_source
+from clrt.accel.device_builder import SHAPES, BuilderLayout, program_source
 from clrt.accel.layouts import sphere_boxes
 from clrt.accel.morton import CODE_BITS, radix_sort, sort_primitives
 from clrt.accel.ploc import SLOW
 from clrt.accel.wide import leaf_fields
-from clrt.device.launches.data_parallel import Blocks
+from clrt.device.launches.data_parallel import DataParallel
 from clrt.device.open import Device
 
 from .cases import SCENES, edges
@@ -52,7 +52,7 @@ def chance(low: NDArray[Any], high: NDArray[Any], scene_low: NDArray[Any], scene
     return np.asarray(volume + (1 - volume) * half_area(low, high) / half_area(scene_low, scene_high) / 2)
 
 
-def least_work(tree: Binary, shape: Shape) -> float:
+def least_work(tree: Binary, shape: BuilderLayout) -> float:
     """Return the cost of the cheapest wide BVH cut from the binary one; a pack is opened only if that saves a fifth."""
     count, low, high = len(tree.sphere), tree.nodes["lo"], tree.nodes["hi"]
     met = chance(np.concatenate([tree.low, low]), np.concatenate([tree.high, high]), low[-1], high[-1])
@@ -97,7 +97,7 @@ def test_no_wide_tree_over_the_same_clusters_costs_less(device: Device, layout: 
 @pytest.mark.parametrize("count", [1, 200, 5000])
 @pytest.mark.parametrize("bits", [0, 1, 20, CODE_BITS])
 def test_codes_are_sorted_and_equal_ones_stay_in_order(device: Device, bits: int, count: int) -> None:
-    work = Blocks(device, program_source(SHAPES["bvh8"], True, False, False))
+    work = DataParallel(device, program_source(SHAPES["bvh8"], True, False, False))
     codes = np.random.default_rng(bits).integers(1 << bits, size=count, dtype=np.uint64)
     sorted_codes, values = radix_sort(work, work.upload(codes), work.upload(np.arange(count, dtype=np.uint32)), count)
     order = np.argsort(codes, kind="stable")
@@ -108,7 +108,7 @@ def test_codes_are_sorted_and_equal_ones_stay_in_order(device: Device, bits: int
 @pytest.mark.parametrize("count, arrays", [(1, 1), (300, 3), (70_001, 2)])
 @pytest.mark.parametrize("groups", [False, True])
 def test_sums_of_what_stands_before(device: Device, groups: bool, count: int, arrays: int) -> None:
-    work = Blocks(like_gpu(device) if groups else device, program_source(SHAPES["bvh8"], True, False, False))
+    work = DataParallel(like_gpu(device) if groups else device, program_source(SHAPES["bvh8"], True, False, False))
     values = np.random.default_rng(0).integers(1000, size=(arrays, count), dtype=np.uint32)
     array = work.upload(values)
     work.scan(array, count, arrays)
@@ -129,7 +129,7 @@ def test_primitives_follow_the_morton_curve(device: Device, case: str) -> None:
     code = (bits << np.arange(63, dtype=np.uint64).reshape(21, 3)[:, ::-1]).sum(axis=(1, 2))
     order = np.argsort(code, kind="stable")
 
-    work = Blocks(device, program_source(SHAPES["bvh8"], True, len(balls) > 0, False))
+    work = DataParallel(device, program_source(SHAPES["bvh8"], True, len(balls) > 0, False))
     primitives = sort_primitives(work, triangles, balls)
     np.testing.assert_array_equal(work.download(primitives.ids, np.uint32, primitives.count), order)
     shapes = work.download(primitives.shapes, np.float32, 9 * primitives.count).reshape(-1, 9)

@@ -14,7 +14,7 @@ from clrt.accel.device_builder import SHAPES, program_source
 from clrt.accel.morton import sort_primitives
 from clrt.accel.ploc import BINARY_NODE, BinaryTree
 from clrt.accel.reinsertion import DEEP, reinsert
-from clrt.device.launches.data_parallel import Blocks
+from clrt.device.launches.data_parallel import DataParallel
 from clrt.device.open import Device
 
 from ..covering import others
@@ -90,7 +90,7 @@ def test_the_best_move_is_always_made(device: Device, seed: int, monkeypatch: py
         nodes[node]["left"], nodes[node]["right"] = (roots.pop(rng.integers(len(roots))) for _ in range(2))
         roots.append(node)
 
-    work = Blocks(device, program_source(SHAPES["bvh8"], True, False, True))
+    work = DataParallel(device, program_source(SHAPES["bvh8"], True, False, True))
     primitives = sort_primitives(work, triangles, NO_SPHERES)
     corners = triangles[work.download(primitives.ids, np.uint32, count)]
     after = reinsert(work, primitives, BinaryTree(work.upload(nodes), [1] * (count - 1)), 1)

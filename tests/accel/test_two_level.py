@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.accel.layouts import Layout
-from clrt.accel.two_level import TwoLevels
+from clrt.accel.two_level import TwoLevelBvh
 from clrt.accel.upper_level import FORMS, upper_level
 from clrt.accel.wide import EMPTY
 from clrt.device.open import Device
@@ -98,7 +98,7 @@ MOST: dict[str, Callable[[Records, int, int, int], int]] = {"bvh2": most_bvh2, "
 def test_stacks_hold_and_all_is_reached(device: Device, layout: str, builder: str, kinds: int) -> None:
     """For one mesh the bound is tight, up to entries in registers; for several the deepest may not be the lowest."""
     mesh = np.arange(60, dtype=np.int32) % kinds
-    tree = TwoLevels(device, layout, builder, MESHES[:kinds], mesh).place(in_a_row(len(mesh)))
+    tree = TwoLevelBvh(device, layout, builder, MESHES[:kinds], mesh).place(in_a_row(len(mesh)))
     records = Records(device, tree)
     most = MOST[layout](records, 0, WORLD, 0)
     assert sorted(records.seen) == [(i, p) for i, m in enumerate(mesh) for p in range(len(MESHES[m]))]

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clrt.accel.builders import BUILDERS, midpoint, sah
-from clrt.accel.bvh import IntArray, Tree, empty_tree, half_area, join
-from clrt.accel.wide import EMPTY, MAX_PRIMITIVES, Wide, collapse, leaf_fields
+from clrt.accel.bvh import IntArray, Bvh, empty_tree, half_area, join
+from clrt.accel.wide import EMPTY, MAX_PRIMITIVES, WideBvh, collapse, leaf_fields
 from clrt.errors import SceneError
 
 from .cases import NASTY, soup, spheres
@@ -20,7 +20,7 @@ from .cases import NASTY, soup, spheres
 Children = list[list[int]]  # of every node; a leaf is -1
 
 
-def mixed_tree(count: int, seed: int = 0) -> Tree:
+def mixed_tree(count: int, seed: int = 0) -> Bvh:
     triangles, balls = soup(count, seed=seed), spheres(count // 3, seed)
     return join(sah(triangles.min(axis=1), triangles.max(axis=1), 8, 8),
                 midpoint(balls[:, :3] - balls[:, 3:], balls[:, :3] + balls[:, 3:]))
@@ -48,7 +48,7 @@ def test_leaves_and_their_boxes_stay(count: int, width: int) -> None:
     assert (wide.aabb_min[unused] == np.inf).all() and (wide.aabb_max[unused] == -np.inf).all()
 
 
-def least_cost(tree: Tree, width: int) -> float:
+def least_cost(tree: Bvh, width: int) -> float:
     """Return the least cost over all sets of interior nodes, with the root, that have at most `width` children each."""
     area = half_area(tree.aabb_min, tree.aabb_max)
     below = [int(node) for node in np.flatnonzero(~tree.leaf) if node]
@@ -73,12 +73,12 @@ def test_no_wide_tree_costs_less(seed: int, width: int) -> None:
     assert collapse(tree, width).sah_cost() == pytest.approx(least_cost(tree, width), rel=1e-9)
 
 
-def binary_children(tree: Tree) -> Children:
+def binary_children(tree: Bvh) -> Children:
     return [[] if count else [child if tree.count[child] == 0 else -1 for child in (first, first + 1)]
             for first, count in zip(tree.left_first.tolist(), tree.count.tolist())]
 
 
-def wide_children(wide: Wide) -> Children:
+def wide_children(wide: WideBvh) -> Children:
     return [[max(child, -1) for child in row if child != EMPTY] for row in wide.child.tolist()]
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clrt.cli.goal import Goal, Pace, time_left
+from clrt.cli.goal import Goal, RenderSpeed, time_left
 from clrt.rendering.compile.records import PIXEL
 from clrt.rendering.film.film import Film
 from clrt.rendering.renderer import State
@@ -35,7 +35,7 @@ def state(spp: int, seconds: float, noise: float | None = None) -> State:
 
 def test_the_pace_is_that_of_late() -> None:
     """The rate is 100 per second at first, then 10; it follows the recent samples."""
-    pace, samples = Pace(), 0.0
+    pace, samples = RenderSpeed(), 0.0
     for second in range(1, 101):
         samples += 100 if second <= 50 else 10
         pace.add(float(second), int(samples))
@@ -45,7 +45,7 @@ def test_the_pace_is_that_of_late() -> None:
 
 def test_the_first_pace_is_the_mean_so_far() -> None:
     """The rate stays the same if the time has not advanced."""
-    pace = Pace()
+    pace = RenderSpeed()
     pace.add(2.0, 400)
     assert pace.rate == 200
     pace.add(2.0, 400)

@@ -18,8 +18,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from clrt.cli.bar import BarProgress, StatusLine, bar, columns, fitted
+from clrt.cli.displays import make_progress
 from clrt.cli.goal import Goal
-from clrt.cli.progress import PHASES, PlainProgress, make_progress
+from clrt.cli.progress import PHASES, PlainProgress
 
 from .test_progress import SCENE, state
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clrt.debug.names import Names
+from clrt.debug.names import SceneNames
 from clrt.debug.summary import summary
 from clrt.debug.trace import PixelPaths, trace_pixel
 from clrt.debug.vertices import Vertex, vertices
@@ -44,7 +44,7 @@ def above_floor(*meshes: Mesh, material: Diffuse | Mirror = WHITE, **parts: Any)
 
 def explained(device: Device, scene: Scene, pixel: tuple[int, int] = (4, 4)) -> str:
     paths = trace_pixel(scene, device, pixel)
-    return summary(paths, Names(scene, paths.compiled))
+    return summary(paths, SceneNames(scene, paths.compiled))
 
 
 ROOF, VEIL = square(2.0, "roof", BLACK), square(1.5, "veil", Diffuse(color=(0.0, 0.0, 0.0), opacity=0.5))
@@ -95,7 +95,7 @@ def test_where_the_light_comes_from(device: Device) -> None:
 
 def listed(device: Device, scene: Scene, pixel: tuple[int, int] = (4, 4)) -> tuple[PixelPaths, list[Vertex]]:
     paths = trace_pixel(scene, device, pixel)
-    names = Names(scene, paths.compiled)
+    names = SceneNames(scene, paths.compiled)
     return paths, [vertex for sample in range(scene.render.spp) for vertex in vertices(paths, names, sample)]
 
 
@@ -135,7 +135,7 @@ def test_names_of_objects_and_lights(monkeypatch: pytest.MonkeyPatch) -> None:
     scene.materials = {"lamp": scene.meshes[1].material}
     scene.meshes[1] = replace(scene.meshes[1], name="lamp")
     compiled = compile_scene(scene, Choices())
-    names = Names(scene, compiled)
+    names = SceneNames(scene, compiled)
     assert compiled.instances and [names.light(i) for i in range(int(compiled.counts["lights"][0]))] == [
         'mesh "lamp"', 'sphere "sphere" (object 6)', "light[0] (point)", "light[3] (spot)", "light[1] (directional)",
         "light[2] (directional)", "the environment"]

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.debug import trace
-from clrt.debug.record import End
+from clrt.debug.record import PathEnd
 from clrt.debug.trace import PixelPaths, trace_pixel
 from clrt.device.open import Device
 from clrt.device.programs import program
@@ -86,8 +86,8 @@ def test_vertices_follow_from_each_other(traced: tuple[Doubles, list[PixelPaths]
     for paths in traced[1]:
         rows = {name: paths.rows[name].astype(np.float64) for name in paths.rows.dtype.names or ()}
         assert all(np.isfinite(rows[name]).all() for name in rows if name != "distance")
-        assert np.all(paths.rows["end"][paths.starts + paths.lengths - 1] != End.NONE)
-        goes = np.flatnonzero((paths.rows["end"][:-1] == End.NONE) & (paths.rows["primitive"][1:] >= 0))
+        assert np.all(paths.rows["end"][paths.starts + paths.lengths - 1] != PathEnd.NONE)
+        goes = np.flatnonzero((paths.rows["end"][:-1] == PathEnd.NONE) & (paths.rows["primitive"][1:] >= 0))
         way = rows["position"][goes + 1] - rows["position"][goes]
         there = rows["direction"][goes] * rows["distance"][goes + 1, None]
         assert np.abs(way - there).max(initial=0) <= 1e-4 * np.abs(rows["position"]).max()

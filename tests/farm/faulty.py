@@ -7,12 +7,12 @@ from typing import Any
 
 from clrt.errors import DeviceError
 from clrt.farm import worker_tasks
-from clrt.rendering.accumulation.device_worker import Share, Worker
+from clrt.rendering.accumulation.device_worker import WorkerShare, DeviceWorker
 
 if not hasattr(worker_tasks, "right"):    # Dask loads this more than once
-    setattr(worker_tasks, "right", (worker_tasks.identity, worker_tasks.render_share, Worker.ended))
+    setattr(worker_tasks, "right", (worker_tasks.identity, worker_tasks.render_share, DeviceWorker.ended))
 _identity, _share, _ended = getattr(worker_tasks, "right")
-_first: list[Worker] = []
+_first: list[DeviceWorker] = []
 
 
 def another_version() -> dict[str, str]:
@@ -34,12 +34,12 @@ def share_that_crashes(*arguments: Any) -> Any:
     return _share(*arguments)
 
 
-def ended_of_a_lost_device(self: Worker) -> Share | None:
+def ended_of_a_lost_device(self: DeviceWorker) -> WorkerShare | None:
     """Lose the process's first device after it has rendered more than 4096 samples."""
     _first[:] = _first or [self]
     if self is _first[0] and self.samples > 4096:
         raise DeviceError("the device is lost")
-    share: Share | None = _ended(self)
+    share: WorkerShare | None = _ended(self)
     return share
 
 
@@ -51,4 +51,4 @@ match os.environ.get("CLRT_TEST_FAULT"):
     case "crash":
         setattr(worker_tasks, "render_share", share_that_crashes)
     case "lost":
-        setattr(Worker, "ended", ended_of_a_lost_device)
+        setattr(DeviceWorker, "ended", ended_of_a_lost_device)

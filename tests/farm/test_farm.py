@@ -22,7 +22,7 @@ from clrt.device.open import Device
 from clrt.device.programs.kernel_files import kernel_digest
 from clrt.errors import DeviceError
 from clrt.farm import dispatch
-from clrt.farm.banded_picture import Banded
+from clrt.farm.banded_picture import BandedPicture
 from clrt.farm.cluster import Cluster, connect
 from clrt.farm.farm_renderer import FarmRenderer
 from clrt.farm.local_processes import Processes
@@ -211,7 +211,7 @@ def test_frames(cluster: Cluster) -> None:
 def test_bands(cluster: Cluster, tmp_path: Path) -> None:
     """After an interrupt and damage to one band, an image in bands equals that of one process, in every file format."""
     order = PictureOrder(room(), {"size": (90, 100), "device": 0, "seed": 3, "clamp_direct": 0.5}, spp=4)
-    banded = Banded(order, tmp_path / "a.bands", band_pixels=90 * 16)
+    banded = BandedPicture(order, tmp_path / "a.bands", band_pixels=90 * 16)
     for done, _ in banded.render(cluster):
         if done >= 3:
             break
@@ -219,7 +219,7 @@ def test_bands(cluster: Cluster, tmp_path: Path) -> None:
         file.seek(min(int(name.split()[1]) for name in banded.reports) * 90 * 12)
         file.write(b"damaged")
     kept = len(banded.reports)
-    again = Banded(order, tmp_path / "a.bands", band_pixels=90 * 16)
+    again = BandedPicture(order, tmp_path / "a.bands", band_pixels=90 * 16)
     counts = [done for done, _ in again.render(cluster, resume=True)]
     assert counts[0] < kept and counts[-1] == 7
     expected = clrt.render(room(), size=(90, 100), seed=3, clamp_direct=0.5, spp=4, device=0)

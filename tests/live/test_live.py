@@ -15,9 +15,9 @@ import clrt
 from clrt.device import contexts
 from clrt.device.open import Device
 from clrt.live.history import History
+from clrt.live.image_sizing import DIVISORS, ImageSizing
 from clrt.live.live import Live
-from clrt.live.pace import DIVISORS, Pace
-from clrt.live.picks import Picks, Thing
+from clrt.live.picks import PickRequests, Thing
 from clrt.live.settings import Settings
 from clrt.live.snapshot import Snapshot
 from clrt.scene.editing import with_material
@@ -214,7 +214,7 @@ def test_steps_are_undone_and_what_is_no_step_stays() -> None:
 
 def test_pace() -> None:
     """If a sample takes 1 µs per pixel and preparation 10 ms, the largest size in time is chosen, or the smallest."""
-    pace, full = Pace(), (1600, 900)
+    pace, full = ImageSizing(), (1600, 900)
     for _ in range(20):
         pace.note(pace.size(full, 1, 0.1), 1, 0.01, 1e-6 * np.prod(pace.size(full, 1, 0.1)))
     width, height = pace.size(full, 1, 0.1)
@@ -231,7 +231,7 @@ def test_settings_have_limits(wrong: dict[str, Any]) -> None:
 
 def test_picks_that_nobody_waits_for() -> None:
     """A cancelled pick or an error of any type does not affect other picks; after the end, picks are cancelled."""
-    picks = Picks()
+    picks = PickRequests()
     given_up, wrong, last = (picks.ask(x, 0.0) for x in (0.1, 0.2, 0.3))
     given_up.cancel()
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from clrt.bench.numerics.kernel_probe import choices
 from clrt.bench.significance import mean_test
 from clrt.device.open import Device
-from clrt.rendering.accumulation.single_device import Session
+from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.film.film import Film
 from clrt.scene.materials.material_types import Material
@@ -21,14 +21,14 @@ from clrt.scene.model import Camera, Mesh, Sampler, Scene
 Doubles = NDArray[np.float64]
 
 
-def session(device: Device, scene: Scene, sampler: Sampler = "independent", **chosen: Any) -> Session:
+def session(device: Device, scene: Scene, sampler: Sampler = "independent", **chosen: Any) -> SingleDeviceAccumulation:
     """Return a session of the scene with its own settings except for the sampler: the tests assume independent samples.
 
     `chosen`: see Choices. Compiled programs are shared between sessions.
     """
     settings = replace(scene.render, sampler=sampler)
-    return Session(device, compile_scene(replace(scene, render=settings), choices(device, **chosen)), settings.size,
-                   settings.max_depth, settings.seed, settings.spp)
+    compiled = compile_scene(replace(scene, render=settings), choices(device, **chosen))
+    return SingleDeviceAccumulation(device, compiled, settings.size, settings.max_depth, settings.seed, settings.spp)
 
 
 def film(device: Device, scene: Scene, spp: int | None = None, **chosen: Any) -> Film:

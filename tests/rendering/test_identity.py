@@ -16,11 +16,11 @@ import pytest
 
 import clrt
 from clrt.accel.traversal_kernels import HitTests
-from clrt.cli.frames import FILES, Sequence
+from clrt.cli.frames import FILES, FrameSequence
 from clrt.cli.goal import Goal
 from clrt.cli.outputs import Outputs
 from clrt.device.open import Device
-from clrt.farm.banded_picture import Banded
+from clrt.farm.banded_picture import BandedPicture
 from clrt.farm.orders import PictureOrder
 from clrt.live.settings import Settings
 from clrt.rendering.checkpoint.identity import (CODE, ENDS, NAMES, ROUNDING, UNSEEN, code_digest, differences, facts_of,
@@ -191,10 +191,10 @@ def test_bands_are_of_one_order(change: dict[str, Any]) -> None:
     in_order = {each.name for each in fields(order)}
     other = replace(order, **{name: value for name, value in change.items() if name in in_order},
                     options=order.options | {name: value for name, value in change.items() if name not in in_order})
-    facts = [Banded(each, Path("a"))._facts() for each in (order, other)]
+    facts = [BandedPicture(each, Path("a"))._facts() for each in (order, other)]
     assert differences(*facts) and not differences(facts[0], facts[0])
     elsewhere = replace(order, options=order.options | {"device": 1})
-    assert not differences(facts[0], Banded(elsewhere, Path("b"))._facts())
+    assert not differences(facts[0], BandedPicture(elsewhere, Path("b"))._facts())
 
 
 def test_frames_are_of_one_goal_and_one_view(tmp_path: Path) -> None:
@@ -203,7 +203,7 @@ def test_frames_are_of_one_goal_and_one_view(tmp_path: Path) -> None:
     goal, content = Goal(4, None, 0.5, 95.0), scene()
 
     def hash_of(outputs: Outputs, goal: Goal) -> Any:
-        sequence = Sequence(outputs, (), None, False)
+        sequence = FrameSequence(outputs, (), None, False)
         sequence._stills = {0: content.camera}
         return next(sequence.left(content, Choices(), goal))[0].header["frame_hash"]
 

@@ -19,7 +19,7 @@ from clrt.rendering.accumulation import checked_loops
 from clrt.rendering.accumulation.accumulation import Accumulation
 from clrt.rendering.accumulation.denoiser_guides import render_guides
 from clrt.rendering.accumulation.first_hits import first_hits
-from clrt.rendering.accumulation.work_queue import Part, Work
+from clrt.rendering.accumulation.work_queue import WorkPart, WorkQueue
 from clrt.rendering.compile import compile_scene as compiling
 from clrt.rendering.renderer import Renderer
 from clrt.scene.materials.material_types import Diffuse
@@ -68,14 +68,15 @@ def test_a_limit_is_found_where_there_is_one(device: Device) -> None:
 def test_short_launches_change_nothing(device: Device, turns: int, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = picture(device)
     limit(monkeypatch, turns)
-    launched = list[Part]()
+    launched = list[WorkPart]()
 
-    def cut(*arguments: Any, original: Callable[..., Part | None] = Work.cut, **limits: Any) -> Part | None:
+    def cut(*arguments: Any, original: Callable[..., WorkPart | None] = WorkQueue.cut,
+            **limits: Any) -> WorkPart | None:
         part = original(*arguments, **limits)
         launched.extend([part] if part else [])
         return part
 
-    monkeypatch.setattr(Work, "cut", cut)
+    monkeypatch.setattr(WorkQueue, "cut", cut)
     assert np.array_equal(picture(device), whole)
     most = max(part.more for part in launched)
     # A path vertex traces two rays, each testing the whole list: 6 rows of 6 quads, less a triangle at the poles.
@@ -83,14 +84,14 @@ def test_short_launches_change_nothing(device: Device, turns: int, monkeypatch: 
 
 
 def test_work_is_shortened_in_order() -> None:
-    work = Work(np.zeros((1, 3), np.int64))
-    work.take(np.arange(3), [Part(0, 3, 0, 7)])
+    work = WorkQueue(np.zeros((1, 3), np.int64))
+    work.take(np.arange(3), [WorkPart(0, 3, 0, 7)])
     done = []
     while work.parts:
         done.append(work.cut(100, 2, most_tiles=2, most_samples=3))
     work.settle()
-    assert done == [Part(0, 2, 0, 3), Part(2, 3, 0, 3), Part(0, 2, 3, 3), Part(2, 3, 3, 3), Part(0, 2, 6, 1),
-                    Part(2, 3, 6, 1)]
+    assert done == [WorkPart(0, 2, 0, 3), WorkPart(2, 3, 0, 3), WorkPart(0, 2, 3, 3), WorkPart(2, 3, 3, 3),
+                    WorkPart(0, 2, 6, 1), WorkPart(2, 3, 6, 1)]
     assert work.samples.tolist() == [[7, 7, 7]]
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.bench.numerics.bsdf_cases import variants
-from clrt.rendering.compile.materials.pack_materials import Tables, pack_materials
-from clrt.rendering.compile.materials.pack_textures import Textures
+from clrt.rendering.compile.materials.pack_materials import MaterialTables, pack_materials
+from clrt.rendering.compile.materials.pack_textures import PackedTextures
 from clrt.scene.materials.material_types import MATERIALS, Material
 from clrt.scene.materials.textures import Picture, Texture
 
@@ -43,7 +43,7 @@ def test_materials_are_packed_together_as_alone(kind: type[Material], seed: int)
     """A record equals that of the material packed alone, and refers to no texture that the material does not use."""
     rng = np.random.default_rng(seed)
     users = [textured(kind, rng) for _ in range(COUNT)]
-    textures, tables = Textures(), Tables()
+    textures, tables = PackedTextures(), MaterialTables()
     together = pack_materials(users, textures, tables, "none")
     _, records = together.buffers[kind.kernel]
     for code, user in zip(together.codes, users):

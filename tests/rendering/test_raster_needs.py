@@ -12,8 +12,8 @@ from clrt.device.launches.device_arrays import on_device
 from clrt.device.open import Device
 from clrt.errors import DeviceError, NoRoomError, SceneError, UsageError
 from clrt.rendering.accumulation.launch_plan import first_launch
-from clrt.rendering.accumulation.multi_device import Crew
-from clrt.rendering.accumulation.raster_bins import Bins
+from clrt.rendering.accumulation.multi_device import MultiDeviceAccumulation
+from clrt.rendering.accumulation.raster_bins import RasterBins
 from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.renderer import Renderer
@@ -31,7 +31,7 @@ def test_several_devices_and_tiles_render_the_same_picture(device: Device, monke
     for limit in ("1G", "80K"):
         monkeypatch.setenv(VARIABLE, limit)
         renderer = Renderer(PLANTED, device=device.info.index, integrator="raster", sampler="independent", spp=4)
-        assert isinstance(renderer.session, Crew) == (limit == "80K")
+        assert isinstance(renderer.session, MultiDeviceAccumulation) == (limit == "80K")
         films.append(list(renderer.passes(spp=4))[-1].film.pixels.tobytes())
     assert films[0] == films[1]
 
@@ -48,7 +48,7 @@ def test_bins_are_in_the_memory_plan(device: Device) -> None:
     scene = Scene(meshes=[ball(4, (0.0, 0.0, -3.0))], camera=AHEAD, render=SETTINGS)
     compiled = compile_scene(scene, Choices(), device=device)
     arguments = [*(on_device(device, array) for _, array in compiled.buffers.values()), compiled.counts[0]]
-    bins, launch = Bins(device, compiled, arguments), first_launch(compiled, SIZE, 2, 0, None)
+    bins, launch = RasterBins(device, compiled, arguments), first_launch(compiled, SIZE, 2, 0, None)
     full = {"film": device.info.global_bytes - 64 * 5120 // 4}
     with pytest.raises(NoRoomError, match="outlines .* KiB"):
         bins.of(launch, full)

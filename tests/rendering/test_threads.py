@@ -15,7 +15,7 @@ from clrt.device.open import Device
 from clrt.rendering.renderer import Renderer
 
 from .checkpoints import renderer, run, same
-from .test_crew import crew
+from .test_multi_device import crew
 
 
 @pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scene.geometry.scaling import Frame, in_frame
+from ...scene.geometry.scaling import SceneFrame, in_frame
 from ...scene.geometry.transform import rotation, transform_camera, transform_light, transform_mesh
 from ...scene.model import Environment, Scene, Sphere
 from .random_draws import Draws
@@ -21,7 +21,7 @@ class Similarity:
 
     mirrored: bool
     turn: tuple[float, float, float]
-    frame: Frame
+    frame: SceneFrame
 
     @property
     def linear(self) -> Matrix:
@@ -56,7 +56,7 @@ def random_similarity(scene: Scene, draws: Draws) -> Similarity:
         mirrored, turn = False, (0.0, 0.0, 0.0)
     elif scene.environment.image is not None:
         turn = (0.0, turn[1], 0.0)
-    return Similarity(mirrored, turn, Frame(draws.vector(-20.0, 20.0), draws.decades(-2.0, 2.0)))
+    return Similarity(mirrored, turn, SceneFrame(draws.vector(-20.0, 20.0), draws.decades(-2.0, 2.0)))
 
 
 def _turned(sphere: Sphere, linear: Matrix) -> Sphere:

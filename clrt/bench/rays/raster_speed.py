@@ -15,7 +15,7 @@ from ...device.programs.preamble import typedefs
 from ...device.programs.program import build, make_kernel
 from ...device.programs.struct_types import record
 from ...rendering.accumulation.launch_plan import first_launch
-from ...rendering.accumulation.raster_bins import Bins
+from ...rendering.accumulation.raster_bins import RasterBins
 from ...rendering.compile.compile_scene import compile_scene
 from ...rendering.film.tiles import TILE_PIXELS, tiles_of
 from ...scene.model import Scene
@@ -38,7 +38,7 @@ def seen_both_ways(device: Device, scene: Scene, sample: int = 0, **chosen: Any)
     kernel = make_kernel(device, program, "raster_hits")
     seen = [empty_array(device, SEEN, width * height) for _ in range(2)]
     given = [*(each.buffer for each in seen), on_device(device, tiles), launch[0]]   # kernels keep no references
-    bins = Bins(device, compiled, arguments)
+    bins = RasterBins(device, compiled, arguments)
     kernel.set_args(*arguments, *given, *bins.of(launch, {}))
     run_kernel(device, kernel, -(-len(tiles) * TILE_PIXELS // (compiled.choices.lanes * device.local_size)))
     rasterised, traced = (each.read(device).reshape(height, width) for each in seen)

@@ -28,7 +28,7 @@ LAUNCH_ITEMS = {"cpu": 1 << 20, "gpu": 1 << 17}
 SCAN_ITEMS, SCAN_PART = 256, 8192
 
 
-class Blocks:
+class DataParallel:
     """The kernels of one program and the arrays that they share, all on one in-order queue.
 
     Kernels launched by `run` take `uint count, uint block` first; the program includes build/scan.cl. `peak_bytes` is

@@ -24,7 +24,7 @@ from .xml import Plugin
 NEARLY_SMOOTH = 0.09
 
 
-class Look(NamedTuple):
+class ShapeMaterial(NamedTuple):
     """A material, and the mesh attribute that multiplies its color, if any."""
 
     material: Material
@@ -39,10 +39,10 @@ class MaterialReader:
 
     def __init__(self, textures: TextureReader) -> None:
         self._textures = textures
-        self._looks: dict[Plugin, Look] = {}
+        self._looks: dict[Plugin, ShapeMaterial] = {}
         self.differences: list[str] = []
 
-    def look(self, plugin: Plugin) -> Look:
+    def look(self, plugin: Plugin) -> ShapeMaterial:
         """Return the material of a <bsdf>."""
         if plugin not in self._looks:
             if plugin.kind not in BSDFS:
@@ -50,26 +50,26 @@ class MaterialReader:
             self._looks[plugin] = BSDFS[plugin.kind](self, plugin)
         return self._looks[plugin]
 
-    def _diffuse(self, plugin: Plugin) -> Look:
+    def _diffuse(self, plugin: Plugin) -> ShapeMaterial:
         color = self._textures.color(plugin, "reflectance", 0.5)
         if isinstance(color, Attribute):
-            return Look(Diffuse(color=(1.0, 1.0, 1.0)), color)
-        return Look(Diffuse(color=color))
+            return ShapeMaterial(Diffuse(color=(1.0, 1.0, 1.0)), color)
+        return ShapeMaterial(Diffuse(color=color))
 
-    def _twosided(self, plugin: Plugin) -> Look:
+    def _twosided(self, plugin: Plugin) -> ShapeMaterial:
         sides = plugin.all("bsdf")
         if len(sides) != 1:
             plugin.refuse("has two BSDFs", "write one for both sides", "twosided with two BSDFs")
         return self.look(sides[0])
 
-    def _mask(self, plugin: Plugin) -> Look:
+    def _mask(self, plugin: Plugin) -> ShapeMaterial:
         opacity = self._textures.number(plugin, "opacity", 0.5)
         if isinstance(opacity, Attribute):
             plugin.refuse("opacity is an attribute", "write a number or a bitmap", "opacity by a mesh's attribute")
         look = self.look(_only(plugin))
         return look._replace(material=replace(look.material, opacity=opacity))
 
-    def _normalmap(self, plugin: Plugin) -> Look:
+    def _normalmap(self, plugin: Plugin) -> ShapeMaterial:
         shadowed = plugin.value("use_shadowing_function", bool, True)
         plugin.value("flip_invalid_normals", bool, True)
         look = self.look(_only(plugin))
@@ -81,32 +81,33 @@ class MaterialReader:
                                     "Mitsuba by u")
         return look._replace(material=replace(look.material, normal_map=normals))
 
-    def _blend(self, plugin: Plugin) -> Look:
+    def _blend(self, plugin: Plugin) -> ShapeMaterial:
         """Blend the colors of two untextured diffuse BSDFs by a number or an attribute."""
         weight = self._textures.number(plugin, "weight", 0.5)
         colors = [look.material.color for look in map(self.look, plugin.all("bsdf"))
-                  if type(look.material) is Diffuse and look == Look(Diffuse(color=look.material.color))]
+                  if type(look.material) is Diffuse and look == ShapeMaterial(Diffuse(color=look.material.color))]
         if len(colors) != 2 or isinstance(weight, Texture) or any(isinstance(each, Texture) for each in colors):
             plugin.refuse("blends anything but two uniform diffuse BSDFs", "write one BSDF", "blendbsdf")
         low, high = (each for each in colors if not isinstance(each, Texture))
         if isinstance(weight, Attribute):
-            return Look(Diffuse(color=(1.0, 1.0, 1.0)), Attribute(weight.name, low, high))
+            return ShapeMaterial(Diffuse(color=(1.0, 1.0, 1.0)), Attribute(weight.name, low, high))
         red, green, blue = (a + weight * (b - a) for a, b in zip(low, high))
-        return Look(Diffuse(color=(red, green, blue)))
+        return ShapeMaterial(Diffuse(color=(red, green, blue)))
 
-    def _dielectric(self, plugin: Plugin) -> Look:
+    def _dielectric(self, plugin: Plugin) -> ShapeMaterial:
         thin, rough = plugin.kind == "thindielectric", plugin.kind == "roughdielectric"
         ior = _index(plugin, "int_ior", "bk7") / _index(plugin, "ext_ior", "air")
         _white(plugin, "specular_reflectance")
         color = self._textures.color(plugin, "specular_transmittance", 1.0)
-        return Look(Dielectric(ior=ior, color=color, thin=thin, roughness=self._roughness(plugin) if rough else 0.0,
-                               multiple_scattering=not rough))    # Mitsuba's models single scattering only
+        roughness = self._roughness(plugin) if rough else 0.0
+        return ShapeMaterial(Dielectric(ior=ior, color=color, thin=thin, roughness=roughness,
+                                        multiple_scattering=not rough))    # Mitsuba's models single scattering only
 
-    def _conductor(self, plugin: Plugin) -> Look:
+    def _conductor(self, plugin: Plugin) -> ShapeMaterial:
         name = plugin.value("material", str, "" if {"eta", "k"} & {*plugin.values} else "none")
         color = self._textures.color(plugin, "specular_reflectance", 1.0)
         if name == "none" and plugin.kind == "conductor":
-            return Look(Mirror(color=color))
+            return ShapeMaterial(Mirror(color=color))
         if color != (1.0, 1.0, 1.0):
             plugin.refuse("specular_reflectance is not 1", "leave it out", "specular_reflectance")
         if name and name not in METALS:
@@ -114,9 +115,9 @@ class MaterialReader:
                           f"metal {name}")
         eta, k = METALS[name] if name else (rgb(plugin.color("eta", 0.0)), rgb(plugin.color("k", 1.0)))
         if plugin.kind == "roughconductor":
-            return Look(Conductor(eta=eta, k=k, roughness=self._roughness(plugin)))
+            return ShapeMaterial(Conductor(eta=eta, k=k, roughness=self._roughness(plugin)))
         self.differences.append(f"{plugin.where}: smooth metal has alpha 0.0001, and reflects point-like lights")
-        return Look(Conductor(eta=eta, k=k, roughness=0.0))
+        return ShapeMaterial(Conductor(eta=eta, k=k, roughness=0.0))
 
     def _roughness(self, plugin: Plugin) -> float:
         """Return √alpha of an isotropic GGX distribution."""
@@ -174,7 +175,7 @@ def absorbing(material: Material, medium: Plugin) -> Material:
     return replace(material, attenuation_color=(red, green, blue), attenuation_distance=1 / most)
 
 
-BSDFS: dict[str, Callable[[Any, Plugin], Look]] = {
+BSDFS: dict[str, Callable[[Any, Plugin], ShapeMaterial]] = {
     "diffuse": MaterialReader._diffuse, "twosided": MaterialReader._twosided, "mask": MaterialReader._mask,
     "normalmap": MaterialReader._normalmap, "blendbsdf": MaterialReader._blend,
     "dielectric": MaterialReader._dielectric, "thindielectric": MaterialReader._dielectric,

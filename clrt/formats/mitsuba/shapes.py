@@ -17,7 +17,7 @@ from ...scene.model import FloatArray, Instance, Mesh, Sphere
 from ...scene.validation.validate import index_problems
 from ..models import read_model
 from ..ply import ply_records
-from .materials import Look, MaterialReader, absorbing
+from .materials import ShapeMaterial, MaterialReader, absorbing
 from .primitives import cube, cylinder, disk, rectangle, sphere
 from .textures import Attribute, TextureReader
 from .values import Doubles
@@ -78,7 +78,7 @@ class ShapeReader:
         for mesh, attributes in pieces:
             yield _dressed(transform_mesh(mesh, to_world), look, attributes, plugin)
 
-    def _look(self, plugin: Plugin) -> Look:
+    def _look(self, plugin: Plugin) -> ShapeMaterial:
         """Return the material of the shape's BSDF and interior medium; or `stand_in` if it is not supported."""
         try:
             return self._own_look(plugin)
@@ -86,17 +86,17 @@ class ShapeReader:
             if self._stand_in is None:
                 raise
             self.missing[plugin.where] = error.features
-            return Look(self._stand_in)
+            return ShapeMaterial(self._stand_in)
 
-    def _own_look(self, plugin: Plugin) -> Look:
+    def _own_look(self, plugin: Plugin) -> ShapeMaterial:
         bsdfs = plugin.all("bsdf")
         grey = 0.0 if plugin.all("emitter") else 0.5  # Mitsuba's default for a shape without a BSDF
-        look = self._materials.look(bsdfs[-1]) if bsdfs else Look(Diffuse(color=(grey, grey, grey)))
+        look = self._materials.look(bsdfs[-1]) if bsdfs else ShapeMaterial(Diffuse(color=(grey, grey, grey)))
         for medium in plugin.all("medium"):
             look = look._replace(material=absorbing(look.material, medium))
         return look
 
-    def _lit(self, plugin: Plugin, look: Look) -> Look:
+    def _lit(self, plugin: Plugin, look: ShapeMaterial) -> ShapeMaterial:
         """Return the look with the emission of the shape's area emitter."""
         for emitter in plugin.all("emitter"):
             if emitter.kind != "area":
@@ -121,7 +121,7 @@ class ShapeReader:
             place = np.eye(4)
             place[:3, :3] *= part.radius
             place[:3, 3] = part.center
-            moved = _sphere(to_world @ place, Look(part.material), plugin.where)
+            moved = _sphere(to_world @ place, ShapeMaterial(part.material), plugin.where)
             if moved is None:
                 plugin.refuse("stretches a sphere", "scale uniformly", "stretched sphere")
             yield moved
@@ -151,7 +151,7 @@ def _between(plugin: Plugin) -> Doubles:
     return frame @ np.diag([radius, radius, float(np.linalg.norm(along)), 1.0])
 
 
-def _sphere(to_world: Doubles, look: Look, name: str) -> Sphere | None:
+def _sphere(to_world: Doubles, look: ShapeMaterial, name: str) -> Sphere | None:
     """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or if it is textured."""
     linear = to_world[:3, :3]
     squares = linear.T @ linear
@@ -227,7 +227,7 @@ def _attributes(table: np.ndarray[tuple[int], np.dtype[np.void]]) -> dict[str, F
             for name, columns in groups.items()}
 
 
-def _dressed(mesh: Mesh, look: Look, attributes: Attributes, plugin: Plugin) -> Mesh:
+def _dressed(mesh: Mesh, look: ShapeMaterial, attributes: Attributes, plugin: Plugin) -> Mesh:
     """Return the mesh with its material, and the colors of an attribute; a face attribute splits shared vertices."""
     mesh = replace(mesh, material=look.material, name=plugin.where)
     if mesh.uv is None and look.material.textures():

@@ -16,7 +16,7 @@ from ...scene.materials.material_types import Material
 from ...scene.model import Instance, Model
 from ...scene.validation.field_types import show, unknown
 from ...scene.validation.limits import Ge, Le
-from .placement import Placing
+from .placement import Transform
 
 
 #: Maximum number of instances per table.
@@ -24,14 +24,14 @@ MOST_INSTANCES = 2_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Repeat(Placing):
+class Repeat(Transform):
     """Keys of an entry of `repeat`: `count` copies, each placed relative to the one before it."""
 
     count: Annotated[int, Ge(1), Le(MOST_INSTANCES)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class InstanceTable(Placing):
+class InstanceTable(Transform):
     """Keys of [[instance]]; the entries of its `repeat` are read separately."""
 
     mesh: str

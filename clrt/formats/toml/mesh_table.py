@@ -18,13 +18,13 @@ from ...scene.model import Instance, Mesh, Model, Vector
 from ...scene.validation.limits import Ge, Le, Lt
 from ...scene.validation.validate import mesh_problems
 from ..models import read_model
-from .placement import Placing
+from .placement import Transform
 
 Vertex = Annotated[int, Ge(0), Lt(2**31)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeshTable(Placing):
+class MeshTable(Transform):
     """Keys of [[mesh]]."""
 
     name: str | None = None

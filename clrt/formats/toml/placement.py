@@ -15,7 +15,7 @@ Row = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Placing:
+class Transform:
     """Transform keys. A point is scaled, then rotated about the fixed x, y and z axes in this order, then translated;
     or it is multiplied by `matrix`, four rows."""
 
@@ -28,7 +28,7 @@ class Placing:
         """Return the table's transform. Raises SceneError if it is given twice or is not affine."""
         if self.matrix is None:
             return translation(self.translate) @ rotation(self.rotate_degrees) @ scaling(self.scale)
-        if any(getattr(self, key.name) != key.default for key in fields(Placing) if key.name != "matrix"):
+        if any(getattr(self, key.name) != key.default for key in fields(Transform) if key.name != "matrix"):
             raise SceneError(f"{where}: has both a matrix and translate, scale or rotate_degrees; keep one of them")
         if self.matrix[3] != (0.0, 0.0, 0.0, 1.0):
             raise SceneError(f"{where}.matrix[3]: {show(self.matrix[3])} is not affine; write [0, 0, 0, 1]")

@@ -30,7 +30,7 @@ KEYS = {"kd", "ks", "ke", "ns", "ni", "tf", "tr", "d", "illum", "pr", "pm", *OTH
 
 
 @dataclass
-class Entry:
+class MtlMaterial:
     """One newmtl of a library: its `numbers` by key, such as "kd", and the rest of the line for each of its `maps`."""
 
     name: str
@@ -51,16 +51,16 @@ class Entry:
         return int(self.number("illum", 2))
 
 
-def read_library(text: str) -> dict[str, Entry]:
+def read_library(text: str) -> dict[str, MtlMaterial]:
     """Return the entries of a library by name. Raises SceneError if a value is not a number."""
-    entries: dict[str, Entry] = {}
-    entry = Entry("")
+    entries: dict[str, MtlMaterial] = {}
+    entry = MtlMaterial("")
     for line in text.splitlines():
         key, *words = line.split("#")[0].split() or [""]
         key, rest = key.lower(), " ".join(words)
         if key == "newmtl":
             name = printable(" ".join(line.split()[1:]))  # names may contain #
-            entry = entries.setdefault(name, Entry(name))
+            entry = entries.setdefault(name, MtlMaterial(name))
         elif key.startswith(("map_", "bump", "disp", "decal", "refl", "norm")):
             entry.maps[key] = rest
         elif rest and key in KEYS:
@@ -68,7 +68,7 @@ def read_library(text: str) -> dict[str, Entry]:
     return entries
 
 
-def _numbers(entry: Entry, key: str, rest: str) -> list[float]:
+def _numbers(entry: MtlMaterial, key: str, rest: str) -> list[float]:
     words = [word for word in rest.split() if word != "-halo"]
     try:
         numbers = [float(word) for word in words]
@@ -81,7 +81,7 @@ def _numbers(entry: Entry, key: str, rest: str) -> list[float]:
     return numbers
 
 
-def material(entry: Entry, maps: Maps) -> Material:
+def material(entry: MtlMaterial, maps: Maps) -> Material:
     """Convert an entry to a material.
 
     With Pr or Pm it is metallic_roughness; otherwise `illum` selects glass, a mirror, metallic_roughness or diffuse.
@@ -112,7 +112,7 @@ def material(entry: Entry, maps: Maps) -> Material:
     return Diffuse(color=color, **shared)
 
 
-def _painted(texture: Texture | None, entry: Entry, key: str, missing: float,
+def _painted(texture: Texture | None, entry: MtlMaterial, key: str, missing: float,
              most: float = 1.0) -> tuple[float, float, float] | Texture:
     """Return a color, or its map with the color as factor."""
     return entry.color(key, missing, most) if texture is None else replace(texture, factor=entry.color(key, 1.0, most))
@@ -122,7 +122,7 @@ def _numbered(texture: Texture | None, number: float) -> float | Texture:
     return number if texture is None else replace(texture, factor=number)
 
 
-def left_out(entries: Mapping[str, Entry]) -> list[str]:
+def left_out(entries: Mapping[str, MtlMaterial]) -> list[str]:
     """Return descriptions of what the entries have that `material` ignores."""
     maps = sorted({key for entry in entries.values() for key in entry.maps} - MAPS)
     numbers = {key for entry in entries.values() for key in entry.numbers}

@@ -19,14 +19,14 @@ OPTIONS = {"-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp"
 CHANNELS: dict[str, Channel] = {"r": "red", "g": "green", "b": "blue", "m": "alpha"}
 
 
-class Map(NamedTuple):
+class TextureMap(NamedTuple):
     """A map's file name, and the arguments of its options."""
 
     file: str
     options: dict[str, list[str]]
 
 
-def parse_map(words: str) -> Map:
+def parse_map(words: str) -> TextureMap:
     """Parse a map statement: options first; the rest is the file name, which may contain spaces."""
     rest, options = words.split(), {}
     while rest and (option := rest[0].lower()) in OPTIONS:
@@ -35,7 +35,7 @@ def parse_map(words: str) -> Map:
             count += 1
         options[option] = rest[1:count + 1]
         rest = rest[count + 1:]
-    return Map(" ".join(rest), options)
+    return TextureMap(" ".join(rest), options)
 
 
 class Maps:

@@ -18,7 +18,7 @@ from ...file_names import printable
 from ...scene.editing import free_name
 from ...scene.materials.material_types import Material
 from ..referenced_files import name_of, note_read
-from .mtl import Entry, left_out, material, read_library
+from .mtl import MtlMaterial, left_out, material, read_library
 from .mtl_maps import Maps
 
 log = logging.getLogger(__name__)
@@ -163,7 +163,7 @@ def _taken(table: Floats, places: Ints) -> Floats | None:
 
 def _libraries(path: Path, text: str) -> dict[str, Material]:
     """Read the materials of an OBJ file's libraries; for a missing one, the library named like the OBJ file is read."""
-    entries: dict[str, Entry] = {}
+    entries: dict[str, MtlMaterial] = {}
     own = path.with_suffix(".mtl")
     for line in re.findall(r"^[ \t]*mtllib[ \t]+(.*\S)", text, re.MULTILINE):
         names = [line] if (path.parent / line).is_file() else line.split()

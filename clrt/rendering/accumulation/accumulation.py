@@ -17,7 +17,7 @@ from ..compile.compile_scene import CompiledScene
 from ..film.film import Film
 from ..film.tiles import mean_samples, tiles_of
 from .scene_on_device import SceneOnDevice
-from .work_queue import Work
+from .work_queue import WorkQueue
 
 
 class Accumulation(ABC):
@@ -29,7 +29,7 @@ class Accumulation(ABC):
 
     def __init__(self, size: tuple[int, int]) -> None:
         self.size = size
-        self.work = Work(np.zeros(tiles_of(size), np.int64))
+        self.work = WorkQueue(np.zeros(tiles_of(size), np.int64))
         self._torn = False
 
     @property
@@ -74,7 +74,7 @@ class Accumulation(ABC):
         """Whether work is pending."""
         return bool(self.work.parts)
 
-    def work_left(self) -> Work:
+    def work_left(self) -> WorkQueue:
         """Return the work as a checkpoint stores it, along with the current film."""
         return self.work
 
@@ -116,7 +116,7 @@ class Accumulation(ABC):
     def look(self, camera: Camera) -> None:
         """Start afresh, without samples, from this camera (see `SceneOnDevice.look`)."""
         self.wait()
-        self.work, self._torn = Work(np.zeros(tiles_of(self.size), np.int64)), False
+        self.work, self._torn = WorkQueue(np.zeros(tiles_of(self.size), np.int64)), False
         for scene in self.scenes:
             scene.look(camera)
         self._clear()
@@ -143,7 +143,7 @@ class Accumulation(ABC):
         return self.film()
 
     @abstractmethod
-    def restore(self, film: Film, work: Work) -> None:
+    def restore(self, film: Film, work: WorkQueue) -> None:
         """Resume from a film of this size and the work that produced it."""
 
     @property

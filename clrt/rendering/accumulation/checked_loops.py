@@ -17,7 +17,7 @@ from ...device.open import Device
 from ...errors import DeviceError
 from ..film.film import Film
 from ..film.tiles import tile_pixels
-from .work_queue import Work
+from .work_queue import WorkQueue
 
 #: Upper estimates of the loop iterations of a path vertex besides its two rays, and of a ray in a large BVH.
 EDGE_TURNS, RAY_TURNS = 64, 1000
@@ -37,7 +37,7 @@ def most_samples(device: Device, tree: Layout, primitives: int, max_depth: int) 
     return max(1, turns // (MARGIN * max_depth * (2 * ray + EDGE_TURNS)))
 
 
-def check_samples(device: Device, film: Film, work: Work, size: tuple[int, int]) -> None:
+def check_samples(device: Device, film: Film, work: WorkQueue, size: tuple[int, int]) -> None:
     """Raise DeviceError if loops of finished work-items were ended: the film then lacks their samples."""
     turns = loop_turns(device)
     if turns is None or work.parts:

@@ -24,10 +24,10 @@ from ...device.open import Device
 from ...errors import DeviceError, KernelError
 from ..compile.compile_scene import CompiledScene
 from ..film.tiles import TILE_PIXELS
-from .device_worker import Share, Worker
+from .device_worker import WorkerShare, DeviceWorker
 from .launch_plan import FEWEST_TILES
 from .scene_on_device import SceneOnDevice
-from .work_queue import Work
+from .work_queue import WorkQueue
 
 #: Divisor that gives the smallest share from the size of a full launch.
 SMALLEST = 16
@@ -35,7 +35,7 @@ PAUSE = 5e-4
 _log = logging.getLogger(__name__)
 
 
-class Team:
+class DevicePool:
     """Workers for a scene compiled for each device. Raises DeviceError, or the last one's KernelError, if none is left.
 
     launch: see `session.first_launch`; tiles: maximum number of tiles of a film; before: see `SceneOnDevice`.
@@ -43,11 +43,11 @@ class Team:
 
     def __init__(self, devices: Sequence[Device], compiled: Sequence[CompiledScene], launches: Sequence[NDArray[Any]],
                  tiles: int, before: Sequence[SceneOnDevice] = ()) -> None:
-        self.workers: list[Worker] = []
-        self.lost: list[Worker] = []
+        self.workers: list[DeviceWorker] = []
+        self.lost: list[DeviceWorker] = []
         for device, scene, launch in zip(devices, compiled, launches):
             try:
-                self.workers.append(Worker(device, scene, launch, tiles, before))
+                self.workers.append(DeviceWorker(device, scene, launch, tiles, before))
             except (DeviceError, KernelError) as error:
                 if len(devices) == 1:
                     raise
@@ -57,7 +57,7 @@ class Team:
             raise failure
 
     @property
-    def everyone(self) -> list[Worker]:
+    def everyone(self) -> list[DeviceWorker]:
         """All workers, including those that were removed."""
         return [*self.workers, *self.lost]
 
@@ -68,11 +68,11 @@ class Team:
                 for worker in self.everyone]
 
     @property
-    def at(self) -> list[Share]:
+    def at(self) -> list[WorkerShare]:
         """Shares in flight."""
         return [share for worker in self.workers for share in worker.at]
 
-    def run(self, work: Work, film: NDArray[Any], numbers: NDArray[np.uint32]) -> Iterator[None]:
+    def run(self, work: WorkQueue, film: NDArray[Any], numbers: NDArray[np.uint32]) -> Iterator[None]:
         """Render the pending work into the film (tiles, TILE_PIXELS), whose tiles have these numbers in the image;
         yield after each collection. If it is left before its end, call `drain`, or `run` again."""
         while work.parts or self.at:
@@ -84,13 +84,13 @@ class Team:
                 time.sleep(PAUSE)
         work.settle()
 
-    def drain(self, work: Work, film: NDArray[Any]) -> None:
+    def drain(self, work: WorkQueue, film: NDArray[Any]) -> None:
         """Wait for the launches in flight, without starting pending work."""
         while self.at:
             if not self._collect(work, film):
                 time.sleep(PAUSE)
 
-    def _feed(self, worker: Worker, work: Work, film: NDArray[Any], numbers: NDArray[np.uint32]) -> None:
+    def _feed(self, worker: DeviceWorker, work: WorkQueue, film: NDArray[Any], numbers: NDArray[np.uint32]) -> None:
         """Give a share to a worker with too little in flight, smaller near the end, so that all finish together."""
         if worker in self.lost or worker.launches.full:
             return
@@ -103,12 +103,12 @@ class Team:
             return
         rows = work.tiles[part.first:part.end]
         try:
-            worker.begin(Share(part, rows, numbers[rows], film[rows]))
+            worker.begin(WorkerShare(part, rows, numbers[rows], film[rows]))
         except DeviceError as error:
             work.give_back(part)
             self._leave_out(worker, work, error)
 
-    def _collect(self, work: Work, film: NDArray[Any]) -> int:
+    def _collect(self, work: WorkQueue, film: NDArray[Any]) -> int:
         """Store finished shares in the film, and return their number."""
         count = 0
         for worker in list(self.workers):
@@ -123,7 +123,7 @@ class Team:
                 self._leave_out(worker, work, error)
         return count
 
-    def _leave_out(self, worker: Worker, work: Work, error: DeviceError) -> None:
+    def _leave_out(self, worker: DeviceWorker, work: WorkQueue, error: DeviceError) -> None:
         """Remove a worker and return its shares to the others; it stays in `lost`, as releasing it might block."""
         self.workers.remove(worker)
         self.lost.append(worker)
@@ -132,7 +132,7 @@ class Team:
             raise error
         _log.warning("%s is excluded: %s; the others repeat its work", worker.name, error)
 
-    def _take_back(self, worker: Worker, work: Work) -> None:
+    def _take_back(self, worker: DeviceWorker, work: WorkQueue) -> None:
         """Return a worker's shares in flight to the pending work; nothing of them has entered the film."""
         for share in reversed(worker.at):
             work.give_back(share.part)

@@ -18,29 +18,29 @@ from ..compile.compile_scene import CompiledScene
 from ..film.tiles import TILE_PIXELS
 from .launch_plan import FEWEST_TILES, first_launch_samples
 from .scene_on_device import WINDOW, SceneOnDevice, largest_film
-from .work_queue import Part
+from .work_queue import WorkPart
 
 
-class Window(NamedTuple):
+class LaunchBuffers(NamedTuple):
     """Device buffers for the pixels of a launch, in the order of its tiles, and for the tiles' numbers."""
 
     film: cl.Buffer
     tiles: cl.Buffer
 
 
-class Share(NamedTuple):
+class WorkerShare(NamedTuple):
     """Unit of a worker's work: tiles of the image, and their rows in the film.
 
     pixels: (tiles, TILE_PIXELS), the state before the share, and once it has ended the one after it.
     """
 
-    part: Part
+    part: WorkPart
     rows: NDArray[np.uint32]
     tiles: NDArray[np.uint32]
     pixels: NDArray[Any]
 
 
-class Worker:
+class DeviceWorker:
     """Renders shares of an image of `tiles` tiles. Raises DeviceError if it cannot, or fails later."""
 
     def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], tiles: int,
@@ -51,7 +51,7 @@ class Worker:
         self.scene = SceneOnDevice(device, compiled, launch, film_bytes, windows=True, before=before)
         self._windows = self._make_windows()
         self.launches = Launches(first_launch_samples(compiled))
-        self.at: deque[Share] = deque()
+        self.at: deque[WorkerShare] = deque()
         self.samples = 0
 
     @property
@@ -59,14 +59,15 @@ class Worker:
         """Name of the device."""
         return self.scene.device.info.name
 
-    def _make_windows(self) -> deque[Window]:
+    def _make_windows(self) -> deque[LaunchBuffers]:
         """Allocate the windows, halving their size until they fit."""
         context, flags = self.scene.device.context, cl.mem_flags.READ_WRITE
         while True:
             try:
                 with self.scene.allocating():
-                    windows = [Window(cl.Buffer(context, flags, self.window_tiles * self._tile_bytes),
-                                      cl.Buffer(context, flags, self.window_tiles * 4)) for _ in range(IN_FLIGHT)]
+                    windows = [LaunchBuffers(cl.Buffer(context, flags, self.window_tiles * self._tile_bytes),
+                                             cl.Buffer(context, flags, self.window_tiles * 4))
+                               for _ in range(IN_FLIGHT)]
                     for window in windows:
                         self.scene.warm_up(*window)
                 return deque(windows)
@@ -76,7 +77,7 @@ class Worker:
                 self.window_tiles //= 2
                 self.scene.film_bytes = IN_FLIGHT * self.window_tiles * self._tile_bytes
 
-    def begin(self, share: Share) -> None:
+    def begin(self, share: WorkerShare) -> None:
         """Enqueue a share of at most `window_tiles` tiles; its arrays must not be used until it has ended."""
         part, device, window = share.part, self.scene.device, self._windows[0]
         self._windows.rotate(1)
@@ -92,7 +93,7 @@ class Worker:
         self.at.append(share)
         self.launches.begin(event, last, pixels * part.more)
 
-    def ended(self) -> Share | None:
+    def ended(self) -> WorkerShare | None:
         """Return the oldest share in flight if it has ended, else None."""
         if not self.launches.poll():
             return None

@@ -15,23 +15,23 @@ from ..compile.compile_scene import CompiledScene
 from ..film.film import Film
 from ..film.tiles import TILE_PIXELS, row_by_row, tile_by_tile, tiles_of
 from .checked_loops import check_samples
-from .device_pool import Team
-from .device_worker import Worker
+from .device_pool import DevicePool
+from .device_worker import DeviceWorker
 from .launch_plan import first_launch
 from .local import LocalAccumulation
 from .scene_on_device import SceneOnDevice
-from .single_device import Session
-from .work_queue import Work
+from .single_device import SingleDeviceAccumulation
+from .work_queue import WorkQueue
 
 #: Approximate number of launches per pass and device: at the end of a pass some devices wait for others.
 PASS_LAUNCHES = 12
 
 
-class Crew(LocalAccumulation):
+class MultiDeviceAccumulation(LocalAccumulation):
     """Accumulation of the image of a team's scene, or of a band of it: then `size` is the band's, as wide as the image,
     and `first_tile` is its first tile."""
 
-    def __init__(self, team: Team, size: tuple[int, int], first_tile: int = 0) -> None:
+    def __init__(self, team: DevicePool, size: tuple[int, int], first_tile: int = 0) -> None:
         super().__init__(size)
         self.team, self.first_tile = team, first_tile
         tiles, pixel = self.work.samples.size, self.compiled.choices.pixel
@@ -40,7 +40,7 @@ class Crew(LocalAccumulation):
         self._numbers = np.arange(first_tile, first_tile + tiles, dtype=np.uint32)
 
     @property
-    def workers(self) -> list[Worker]:
+    def workers(self) -> list[DeviceWorker]:
         """Workers that are still in use."""
         return self.team.workers
 
@@ -92,19 +92,19 @@ class Crew(LocalAccumulation):
             check_samples(worker.scene.device, film, self.work, self.size)
         return film
 
-    def restore(self, film: Film, work: Work) -> None:
+    def restore(self, film: Film, work: WorkQueue) -> None:
         """Resume from a film of this size and the work that produced it."""
         self.work, self._film = work, tile_by_tile(film.pixels)
 
 
 def make_team(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
               seed: int, planned_spp: int | None, tiles: int | None = None,
-              before: Sequence[SceneOnDevice] = ()) -> Team:
+              before: Sequence[SceneOnDevice] = ()) -> DevicePool:
     """Return a team for the image of this size; tiles: the maximum number of tiles of a film, all by default; before:
     see `SceneOnDevice`."""
     rows, columns = tiles_of(size)
     launches = [first_launch(scene, size, max_depth, seed, planned_spp) for scene in compiled]
-    return Team(devices, compiled, launches, tiles or rows * columns, before)
+    return DevicePool(devices, compiled, launches, tiles or rows * columns, before)
 
 
 def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
@@ -112,5 +112,6 @@ def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], s
     """Return a Session if there is one device with room for the film, else a Crew; before: see `SceneOnDevice`."""
     if len(devices) == 1:
         with suppress(NoRoomError):
-            return Session(devices[0], compiled[0], size, max_depth, seed, planned_spp, before)
-    return Crew(make_team(devices, compiled, size, max_depth, seed, planned_spp, before=before), size)
+            return SingleDeviceAccumulation(devices[0], compiled[0], size, max_depth, seed, planned_spp, before)
+    team = make_team(devices, compiled, size, max_depth, seed, planned_spp, before=before)
+    return MultiDeviceAccumulation(team, size)

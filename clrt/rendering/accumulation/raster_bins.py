@@ -9,7 +9,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ...device.launches.data_parallel import Blocks
+from ...device.launches.data_parallel import DataParallel
 from ...device.launches.launch import calling
 from ...device.launches.memory_plan import check_room, size
 from ...device.open import Device
@@ -47,7 +47,7 @@ def drawn_before(compiled: CompiledScene) -> NDArray[np.int64]:
     return np.append(0, np.cumsum(faces))
 
 
-class Bins:
+class RasterBins:
     """Bins of one camera at a time, on a device. scene_arguments: leading arguments of every kernel of the scene.
 
     Raises NoRoomError if more primitives are to be drawn than can be numbered.
@@ -60,7 +60,7 @@ class Bins:
         if sum(self._drawn) > MOST:
             raise NoRoomError(f"{sum(self._drawn)} primitives are too many to rasterise, at most {MOST}; use the "
                               "integrator local, or fewer instances")
-        self._blocks = Blocks(device, compiled.source_of("raster/outline.cl"))
+        self._blocks = DataParallel(device, compiled.source_of("raster/outline.cl"))
         self._before, self._instances = self._blocks.upload(before.astype(np.uint32)), len(before) - 1
         self._view = b""
         self._held: list[cl.Buffer] = []

@@ -24,7 +24,7 @@ from ...scene.model import Camera
 from ..compile.camera_kernel import CAMERA_FIELDS, launch_record
 from ..compile.compile_scene import CompiledScene
 from .checked_loops import most_samples
-from .raster_bins import Bins
+from .raster_bins import RasterBins
 
 #: Defined in programs whose film holds only the pixels of a launch.
 WINDOWS = "#define FILM_WINDOWS 1\n"
@@ -53,7 +53,7 @@ class SceneOnDevice:
     def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], film_bytes: int,
                  windows: bool = False, before: Sequence[SceneOnDevice] = ()) -> None:
         self.device, self.compiled, self.launch, self.film_bytes = device, compiled, launch, film_bytes
-        self._bins: Bins | None = None
+        self._bins: RasterBins | None = None
         self._check_memory()
         primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
         #: Maximum samples per pixel in one launch; None if unlimited.
@@ -70,7 +70,7 @@ class SceneOnDevice:
         #: Leading arguments of every kernel of the scene (SCENE_PARAMETERS).
         self.scene_arguments = [*sum(self._buffers.values(), []), compiled.counts[0]]
         if compiled.entry == "raster.cl":
-            self._bins = Bins(device, compiled, self.scene_arguments)
+            self._bins = RasterBins(device, compiled, self.scene_arguments)
         self.build_seconds = 0.0 if self._warm else self.program.build_seconds
 
     def _uploaded(self, array: Any) -> list[cl.Buffer]:

@@ -22,7 +22,7 @@ from .checked_loops import check_samples
 from .launch_plan import FEWEST_TILES, first_launch, first_launch_samples
 from .local import LocalAccumulation
 from .scene_on_device import SceneOnDevice, largest_film
-from .work_queue import Work
+from .work_queue import WorkQueue
 
 #: Approximate number of launches per pass, unless a single sample per pixel needs more.
 PASS_LAUNCHES = 4
@@ -38,7 +38,7 @@ class _Tiles:
             self.numbers, self.buffer = numbers, on_device(device, numbers)
 
 
-class Session(LocalAccumulation):
+class SingleDeviceAccumulation(LocalAccumulation):
     """Accumulation of one compiled scene at one size, on one device. Raises NoRoomError if scene or film do not fit."""
 
     def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,
@@ -114,7 +114,7 @@ class Session(LocalAccumulation):
         check_samples(self.device, film, self.work, self.size)
         return film
 
-    def restore(self, film: Film, work: Work) -> None:
+    def restore(self, film: Film, work: WorkQueue) -> None:
         """Resume from a film of this size and the work that produced it."""
         self.work = work
         with calling():

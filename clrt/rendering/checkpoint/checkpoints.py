@@ -15,7 +15,7 @@ from ...threads import beside
 from ..compile.choices import Choices
 from .checkpoint_file import FAMILY, check_replaceable, older, read_checkpoint, write_checkpoint
 from .identity import differences, facts_of
-from .saved_state import KINDS, NO_SENSE, Kept, from_arrays, to_arrays
+from .saved_state import KINDS, NO_SENSE, SavedState, from_arrays, to_arrays
 
 #: Minimum time between two checkpoints, as a multiple of the time that writing one takes.
 COST = 50
@@ -50,7 +50,7 @@ class Checkpoints:
         """Whether the next checkpoint is due."""
         return time.perf_counter() >= self._next
 
-    def begin(self, kept: Kept) -> None:
+    def begin(self, kept: SavedState) -> None:
         """Start writing a checkpoint in the background; the state must not change until `wait` has returned."""
         self.wait()
         self._writing = beside(lambda: self.write(kept))
@@ -59,7 +59,7 @@ class Checkpoints:
         """Wait for the write that `begin` started."""
         self._writing()
 
-    def write(self, kept: Kept) -> None:
+    def write(self, kept: SavedState) -> None:
         """Write a checkpoint; if that fails, warn once and keep the previous one."""
         start = time.perf_counter()
         header = {"facts": self._facts, "device": self._device, "planned_spp": kept.planned_spp,
@@ -75,7 +75,7 @@ class Checkpoints:
         end = time.perf_counter()
         self._next = end + max(self._every, COST * (end - start))
 
-    def read(self, size: tuple[int, int]) -> Kept | None:
+    def read(self, size: tuple[int, int]) -> SavedState | None:
         """Return the newest intact state, of an image of (width, height), or None if there is no checkpoint yet.
 
         Raises CheckpointError if it belongs to another render, or if no generation is intact.
@@ -118,7 +118,7 @@ class Checkpoints:
 
 
 def open_checkpoints(path: StrPath | None, resume: bool, seconds: float, scene: Scene, choices: Choices,
-                     device: str) -> tuple[Checkpoints | None, Kept | None]:
+                     device: str) -> tuple[Checkpoints | None, SavedState | None]:
     """Return a render's checkpoints, if enabled, and the state to resume from, if there is one."""
     if path is None:
         if resume:

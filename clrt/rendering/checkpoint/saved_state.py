@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..accumulation.work_queue import Part, Work
+from ..accumulation.work_queue import WorkPart, WorkQueue
 from ..compile.records import DIRECT, PIXEL, PIXEL_WITH_DIRECT
 from ..error_estimate.error_estimate import NoiseEstimate
 from ..film.film import Film
@@ -26,18 +26,18 @@ NO_SENSE = "is damaged: its parts are inconsistent"
 
 
 @dataclass(frozen=True)
-class Kept:
+class SavedState:
     """Saved state of a render between two launches. planned_spp: the sampler's planned samples (session.block_bits)."""
 
     planned_spp: int | None
     seconds: float
     history: list[dict[str, Any]]
     film: Film
-    work: Work
+    work: WorkQueue
     noise: NoiseEstimate
 
 
-def to_arrays(kept: Kept) -> Arrays:
+def to_arrays(kept: SavedState) -> Arrays:
     """Return arrays as in KINDS. parts: (k, 4); history: (n, 4), see HISTORY; others: see Work and NoiseEstimate."""
     work, (mean, changes, level) = kept.work, kept.noise.arrays()
     rows = [[np.nan if entry.get(name) is None else entry[name] for name in HISTORY] for entry in kept.history]
@@ -47,14 +47,14 @@ def to_arrays(kept: Kept) -> Arrays:
     return {name: arrays[name].astype(kind, copy=False) for name, kind in KINDS.items()}
 
 
-def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -> Kept:
+def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -> SavedState:
     """Return the saved state of an image of (width, height). Raises ValueError if the parts are inconsistent."""
     planned, seconds = header.get("planned_spp"), header.get("seconds")
     if not (planned is None or type(planned) is int and planned > 0) or type(seconds) is not float or not (
             0 <= seconds < np.inf and _film_fits(header, arrays, size) and _work_fits(arrays, size)
             and _noise_fits(arrays, size)):
         raise ValueError(NO_SENSE)
-    work = Work(arrays["samples"], arrays["then"], arrays["tiles"], map(Part._make, arrays["parts"].tolist()))
+    work = WorkQueue(arrays["samples"], arrays["then"], arrays["tiles"], map(WorkPart._make, arrays["parts"].tolist()))
     noise = NoiseEstimate(planned)
     film = arrays["film"]
     if arrays["direct"].size:
@@ -67,7 +67,7 @@ def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -
     for spp, second, error, relmse in arrays["history"].tolist():
         entry = {"spp": int(spp), "seconds": second, "noise": None if np.isnan(error) else error}
         history.append(entry if np.isnan(relmse) else {**entry, "relmse": relmse})
-    return Kept(planned, seconds, history, Film(film), work, noise)
+    return SavedState(planned, seconds, history, Film(film), work, noise)
 
 
 def _film_parts(film: Film) -> Arrays:
@@ -90,7 +90,8 @@ def _work_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
                 and np.all((0 <= samples) & (samples <= then) & (then <= MOST_SAMPLES))
                 and tiles.ndim == 1 and np.all(tiles < samples.size) and parts.shape[1:] == (4,)
                 and all(0 <= part.first < part.end <= len(tiles) and 0 <= part.samples < MOST_SAMPLES
-                        and 0 < part.more <= MOST_SAMPLES - part.samples for part in map(Part._make, parts.tolist())))
+                        and 0 < part.more <= MOST_SAMPLES - part.samples
+                        for part in map(WorkPart._make, parts.tolist())))
 
 
 def _noise_fits(arrays: Arrays, size: tuple[int, int]) -> bool:

@@ -15,16 +15,16 @@ from ...device.launches.memory_plan import array_bytes, needed_parts
 from ...device.open import Device
 from ...device.programs.preamble import Buffers
 from ...device.programs.program import compose, files_of
-from ...scene.geometry.scaling import Frame, camera_in
+from ...scene.geometry.scaling import SceneFrame, camera_in
 from ...scene.model import Camera, Scene
 from ...scene.validation.validate import validate
 from ..film.tiles import TILE_PIXELS
 from .choices import Choices
 from .compile_ahead import begin_program
 from .features import WITH_LIGHT, features_of, files_for, preamble_of
-from .geometry.pack_instances import Objects
+from .geometry.pack_instances import ObjectIds
 from .pack_scene import pack_scene
-from .reuse_cache import Carried
+from .reuse_cache import ReuseCache
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class CompiledScene:
     tree: Layout
     choices: Choices
     camera: Camera
-    frame: Frame
+    frame: SceneFrame
     instances: int
-    objects: Objects
+    objects: ObjectIds
     part_bytes: int | None = None
     clamps: tuple[float, float] = (inf, inf)
 
@@ -97,7 +97,7 @@ class CompiledScene:
 
 
 def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
-                  device: Device | None = None, carried: Carried | None = None,
+                  device: Device | None = None, carried: ReuseCache | None = None,
                   ahead: bool = False) -> CompiledScene:
     """Validate and pack `scene` for the kernel file `entry`. Raises SceneError listing everything that is wrong with
     it.
@@ -108,7 +108,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     validate(scene)
     if ahead and device is not None:
         begin_program(scene, choices, device, lambda scene, choices: compile_scene(scene, choices).source)
-    packed = pack_scene(scene, choices, device, carried or Carried())
+    packed = pack_scene(scene, choices, device, carried or ReuseCache())
     features = features_of(packed, choices, device is not None and loop_turns(device) is not None)
     part_bytes = needed_parts((array for _, array in packed.buffers.values()), device.info) if device else None
     if entry is None:

@@ -14,7 +14,7 @@ from ..film.tiles import TILE
 from .camera_kernel import camera_file
 from .choices import OFFSETS, Choices
 from .lights.pack_lights import SURFACES, TYPES
-from .pack_scene import Packed
+from .pack_scene import PackedScene
 from .pixel_filters import filter_reach
 from .records import COUNTS, GUIDE, LAUNCH, OUTLINE
 
@@ -30,7 +30,7 @@ def biased_by(settings: RenderSettings) -> list[str]:
     return [name for name in clamps if getattr(settings, name)]
 
 
-def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
+def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[str]:
     """Return the macros that are defined for compilation: features of the scene and of the materials that it uses.
 
     loop_limit: whether the device limits loop iterations (see device.loops).
@@ -61,7 +61,7 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
     return features | {name for name, present in has.items() if present}
 
 
-def preamble_of(packed: Packed, choices: Choices, features: set[str], part_bytes: int | None) -> str:
+def preamble_of(packed: PackedScene, choices: Choices, features: set[str], part_bytes: int | None) -> str:
     """Return the definitions that precede all kernel files. part_bytes: see CompiledScene."""
     emitters, materials = packed.emitters, packed.materials
     # Only programs that use lengths in scene units depend on the unit: all others are shared between units.
@@ -89,7 +89,7 @@ def preamble_of(packed: Packed, choices: Choices, features: set[str], part_bytes
         *(rasterised if "RASTER" in features else [])])
 
 
-def files_for(packed: Packed, choices: Choices, features: set[str]) -> dict[str, list[str]]:
+def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict[str, list[str]]:
     """Return the files that each `#include NAME` in the kernels is replaced by."""
     scene, emitters, sky = packed.scene, packed.emitters, packed.sky
     integrator, lights = scene.render.integrator, [f"light/{t}.cl" for t in emitters.types if t != "sky"]

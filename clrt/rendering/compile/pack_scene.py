@@ -15,21 +15,21 @@ from ...accel.traversal_kernels import tree_buffers
 from ...device.open import Device
 from ...device.programs.preamble import Buffers
 from ...scene.geometry.instancing import arranged
-from ...scene.geometry.scaling import Frame, frame_of, in_frame
+from ...scene.geometry.scaling import SceneFrame, frame_of, in_frame
 from ...scene.materials.material_types import Material
 from ...scene.model import Scene
 from ...threads import beside
 from .choices import Choices
-from .geometry.pack_geometry import Corners, normal_records, sphere_records, triangle_records
-from .geometry.pack_instances import Objects, Placements
+from .geometry.pack_geometry import TriangleCorners, normal_records, sphere_records, triangle_records
+from .geometry.pack_instances import ObjectIds, PackedInstances
 from .geometry.vertex_attributes import pack_corners
-from .lights.environment_map import Sky
-from .lights.pack_lights import Emitters, pack_emitters
-from .materials.pack_materials import Materials, Tables, pack_materials
-from .materials.pack_textures import Textures
+from .lights.environment_map import EnvironmentMap
+from .lights.pack_lights import PackedLights, pack_emitters
+from .materials.pack_materials import PackedMaterials, MaterialTables, pack_materials
+from .materials.pack_textures import PackedTextures
 from .pixel_filters import filter_quantiles
 from .records import COUNTS
-from .reuse_cache import Carried
+from .reuse_cache import ReuseCache
 
 
 class Shapes:
@@ -43,10 +43,10 @@ class Shapes:
         scene, *of_objects = arranged(scene)
         self.frame = frame_of(scene)
         scene = in_frame(scene, self.frame)
-        self.objects = Objects([len(mesh.faces) for mesh in scene.meshes], len(scene.spheres), *of_objects)
-        self.placements = Placements(scene.instances, rest=bool(scene.meshes or scene.spheres))
+        self.objects = ObjectIds([len(mesh.faces) for mesh in scene.meshes], len(scene.spheres), *of_objects)
+        self.placements = PackedInstances(scene.instances, rest=bool(scene.meshes or scene.spheres))
         self.scene = replace(scene, meshes=self.placements.meshes + scene.meshes)
-        self.triangles = Corners(self.scene.meshes)
+        self.triangles = TriangleCorners(self.scene.meshes)
         self.spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
         self.lone = 0 < len(self.spheres) <= FEW_SPHERES
 
@@ -63,7 +63,7 @@ class Shapes:
                 or any(user.is_specular or "TRANSMISSION" in user.features()
                        or "opacity" in user.surface_parameters(render.back_face_culling) for user in self.users))
 
-    def tree(self, choices: Choices, device: Device | None, carried: Carried) -> Layout:
+    def tree(self, choices: Choices, device: Device | None, carried: ReuseCache) -> Layout:
         """Return the BVH over everything but lone spheres; NO_RAYS if none is needed."""
         if not self._follows_rays(choices):
             return NO_RAYS
@@ -73,7 +73,7 @@ class Shapes:
         return carried.tree(device, layout, choices.builder, self.scene.meshes, self.triangles, in_tree, test,
                             self.placements)
 
-    def buffers(self, codes: NDArray[np.int32], emitters: Emitters, normals: NDArray[Any],
+    def buffers(self, codes: NDArray[np.int32], emitters: PackedLights, normals: NDArray[Any],
                 rays: bool) -> dict[str, tuple[str, Any]]:
         """Return the buffers of the surfaces; codes: of the users' materials; rays: whether any are traced."""
         meshes, spheres = self.scene.meshes, self.spheres
@@ -95,14 +95,14 @@ class Shapes:
 
 
 @dataclass(frozen=True)
-class Packed:
+class PackedScene:
     """Packed scene, without its program. counts: a COUNTS record; uv_sets: number of UV sets that its textures use."""
 
     shapes: Shapes
     tree: Layout
-    materials: Materials
-    emitters: Emitters
-    sky: Sky
+    materials: PackedMaterials
+    emitters: PackedLights
+    sky: EnvironmentMap
     uv_sets: int
     buffers: Buffers
     counts: NDArray[Any]
@@ -113,12 +113,12 @@ class Packed:
         return self.shapes.scene
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> SceneFrame:
         """The frame, see `Shapes`."""
         return self.shapes.frame
 
 
-def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: Carried) -> Packed:
+def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: ReuseCache) -> PackedScene:
     """Pack a valid scene; device: where large BVHs are built, if given; carried: cache from the previous scene."""
     shapes = Shapes(scene)
     packing = beside(lambda: carried.sky(scene.environment))    # takes as long as a BVH build; neither uses all cores
@@ -127,7 +127,7 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: C
         normals = normal_records(shapes.scene.meshes)
     finally:    # else it could replace the next scene's environment
         sky = packing()
-    textures, tables = Textures(), Tables()
+    textures, tables = PackedTextures(), MaterialTables()
     emitters = pack_emitters(shapes.scene, sky, textures)
     materials = pack_materials(shapes.users, textures, tables, scene.render.back_face_culling)
     buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, normals, tree is not NO_RAYS)
@@ -135,10 +135,10 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: C
     buffers |= materials.buffers | tables.buffers() | textures.buffers() | emitters.buffers | sky.buffers
     if scene.render.filter != "box":
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
-    return Packed(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, _counts(shapes, emitters))
+    return PackedScene(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, _counts(shapes, emitters))
 
 
-def _counts(shapes: Shapes, emitters: Emitters) -> NDArray[Any]:
+def _counts(shapes: Shapes, emitters: PackedLights) -> NDArray[Any]:
     counts = np.zeros(1, COUNTS)
     counts["triangles"], counts["spheres"] = len(shapes.triangles), len(shapes.spheres)
     counts["lights"] = emitters.count

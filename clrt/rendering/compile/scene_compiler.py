@@ -14,22 +14,22 @@ from ..checkpoint.identity import parts_of
 from .camera_kernel import camera_file
 from .choices import Choices
 from .compile_scene import CompiledScene, compile_scene
-from .reuse_cache import Carried
+from .reuse_cache import ReuseCache
 
 #: Settings that affect neither buffers nor programs.
 PASSING = ("size", "spp", "max_depth", "seed", "adaptive")
 
 
-class Compiler:
+class SceneCompiler:
     """Compiler for several devices. A compiled scene must not be used any more once another one is compiled."""
 
     def __init__(self, devices: Sequence[Device]) -> None:
         self.devices = list(devices)
-        self._carried = [Carried() for _ in devices]
+        self._carried = [ReuseCache() for _ in devices]
         self._last: tuple[Scene, list[Choices], list[CompiledScene]] | None = None
 
     @classmethod
-    def after(cls, last: Compiler | None, devices: Sequence[Device]) -> Compiler:
+    def after(cls, last: SceneCompiler | None, devices: Sequence[Device]) -> SceneCompiler:
         """Return the last compiler if it is for the same devices, else a new one."""
         return last if last and last.devices == devices else cls(devices)
 

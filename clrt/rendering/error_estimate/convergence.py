@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accumulation.accumulation import Accumulation
-from ..checkpoint.saved_state import Kept
+from ..checkpoint.saved_state import SavedState
 from ..film.film import Film
-from ..film.row_bands import Unwanted
+from ..film.row_bands import Cancelled
 from ..film.state import State, relmse
 from ..film.tiles import mean_samples
 from .adaptive_sampling import tiles_to_double
@@ -28,7 +28,7 @@ class Convergence:
         self.noise, self._percentile = NoiseEstimate(planned_spp), percentile
         self.history: list[dict[str, Any]] = []
 
-    def restore(self, kept: Kept) -> None:
+    def restore(self, kept: SavedState) -> None:
         """Resume from a saved state."""
         self.noise, self.history = kept.noise, kept.history
 
@@ -59,7 +59,7 @@ class Convergence:
         film.unwanted = unwanted
         try:
             return self.record(film, tile_samples, seconds, reference)
-        except Unwanted:
+        except Cancelled:
             return None
         finally:
             del film.unwanted   # avoids a reference cycle

@@ -36,7 +36,7 @@ def _padded(values: NDArray[np.float64], rows: tuple[int, int]) -> NDArray[np.fl
 
 class Film:
     """Host copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT; `unwanted` is polled
-    during error estimation, which raises `Unwanted` once it returns True."""
+    during error estimation, which raises `Cancelled` once it returns True."""
 
     unwanted: Callable[[], bool] = staticmethod(lambda: False)
 

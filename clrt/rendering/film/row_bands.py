@@ -14,7 +14,7 @@ PIXELS = 1 << 15
 T = TypeVar("T")
 
 
-class Unwanted(Exception):
+class Cancelled(Exception):
     """Raised if the result of a computation is no longer needed."""
 
 
@@ -31,7 +31,7 @@ def in_bands(size: tuple[int, ...], work: Callable[[slice], T], unwanted: Callab
     """
     def wanted(rows: slice) -> T:
         if unwanted():
-            raise Unwanted
+            raise Cancelled
         return work(rows)
 
     return in_parallel(wanted, bands_of(size))

@@ -19,7 +19,7 @@ Stored = tuple[int, int | None]
 FEW_TRIANGLES = 1 << 16
 
 
-class Arranged(NamedTuple):
+class ArrangedScene(NamedTuple):
     """A scene, and for each of its meshes and instances the number of its object in the original scene.
 
     Objects are numbered: first the meshes, then the instances, then the spheres.
@@ -30,7 +30,7 @@ class Arranged(NamedTuple):
     instances: list[int]
 
 
-def arranged(scene: Scene) -> Arranged:
+def arranged(scene: Scene) -> ArrangedScene:
     """Return the same scene with instances only if they save memory; the others become meshes.
 
     A mesh that the scene also contains directly becomes one more instance. Emissive instances become meshes, so that
@@ -45,8 +45,8 @@ def arranged(scene: Scene) -> Arranged:
     kept = [i for i, keep in enumerate(keeps) if keep]
     rest = [i for i, keep in enumerate(keeps) if not keep]
     meshes = [scene.meshes[i] for i in others] + [baked(every[i]) for i in rest]
-    return Arranged(replace(scene, instances=[every[i] for i in kept], meshes=meshes),
-                    others + [objects[i] for i in rest], [objects[i] for i in kept])
+    return ArrangedScene(replace(scene, instances=[every[i] for i in kept], meshes=meshes),
+                         others + [objects[i] for i in rest], [objects[i] for i in kept])
 
 
 def worth_it(instances: list[Instance]) -> list[bool]:

@@ -27,7 +27,7 @@ MOST = 126
 FAR = 4.0
 
 
-class Frame(NamedTuple):
+class SceneFrame(NamedTuple):
     """Coordinate frame on the device: a point p becomes (p − center)·unit. unit: a power of two."""
 
     center: Vector = (0.0, 0.0, 0.0)
@@ -35,7 +35,7 @@ class Frame(NamedTuple):
 
     def points(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
         """Return points (…, 3) in this frame."""
-        if self == Frame():
+        if self == SceneFrame():
             return points.astype(np.float32, copy=False)
         with np.errstate(over="ignore"):
             return np.asarray((points - np.array(self.center)) * self.unit, np.float32)
@@ -46,15 +46,15 @@ class Frame(NamedTuple):
         return x, y, z
 
 
-def frame_around(low: NDArray[np.floating], high: NDArray[np.floating]) -> Frame:
+def frame_around(low: NDArray[np.floating], high: NDArray[np.floating]) -> SceneFrame:
     """Return the frame for a bounding box; low, high: (3,), or inf and −inf for an empty one."""
     low, high = low.astype(np.float64), high.astype(np.float64)
     if not np.all(low <= high):
-        return Frame()
+        return SceneFrame()
     middle, half = (low + high) / 2, float((high - low).max()) / 2
     center = np.where(np.abs(middle) > FAR * half, middle, 0).astype(np.float32).astype(np.float64)
     x, y, z = center.tolist()
-    return Frame((x, y, z), unit_for(float(np.maximum(np.abs(low - center), np.abs(high - center)).max())))
+    return SceneFrame((x, y, z), unit_for(float(np.maximum(np.abs(low - center), np.abs(high - center)).max())))
 
 
 def unit_for(largest: float) -> float:
@@ -63,13 +63,13 @@ def unit_for(largest: float) -> float:
     return 1.0 if largest == 0 or abs(exponent) <= COMFORTABLE else 2.0**-exponent
 
 
-def frame_of(scene: Scene) -> Frame:
+def frame_of(scene: Scene) -> SceneFrame:
     """Return the frame for the scene's surfaces."""
     balls = [(np.array(sphere.center), sphere.radius) for sphere in scene.spheres]
     boxes = [_box(mesh) for mesh in scene.meshes if mesh.vertices.size] + _instance_boxes(scene.instances)
     low = [box[0] for box in boxes] + [center - radius for center, radius in balls]
     high = [box[1] for box in boxes] + [center + radius for center, radius in balls]
-    return frame_around(np.min(low, axis=0), np.max(high, axis=0)) if low else Frame()
+    return frame_around(np.min(low, axis=0), np.max(high, axis=0)) if low else SceneFrame()
 
 
 def _box(mesh: Mesh) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
@@ -88,11 +88,11 @@ def _instance_boxes(instances: list[Instance]) -> list[tuple[NDArray[np.floating
     return boxes
 
 
-def in_frame(scene: Scene, frame: Frame) -> Scene:
+def in_frame(scene: Scene, frame: SceneFrame) -> Scene:
     """Return the scene in a frame, with point and spot lights scaled so that the image stays the same; each instanced
     mesh gets a frame of its own."""
     scene = replace(scene, instances=_instances(scene.instances, frame))
-    if frame == Frame():
+    if frame == SceneFrame():
         return scene
     return replace(scene, meshes=[replace(mesh, vertices=frame.points(mesh.vertices),
                                           material=mesh.material.in_unit(frame.unit)) for mesh in scene.meshes],
@@ -101,7 +101,7 @@ def in_frame(scene: Scene, frame: Frame) -> Scene:
                    lights=[_light(light, frame) for light in scene.lights])
 
 
-def _instances(instances: list[Instance], frame: Frame) -> list[Instance]:
+def _instances(instances: list[Instance], frame: SceneFrame) -> list[Instance]:
     """Return instances whose meshes are each in the frame around it, with transforms from there to `frame`."""
     meshes = meshes_by_id(instances)
     own = {key: frame_around(*_box(mesh)) for key, mesh in meshes.items()}
@@ -117,19 +117,19 @@ def _instances(instances: list[Instance], frame: Frame) -> list[Instance]:
     return placed
 
 
-def camera_in(camera: Camera, frame: Frame) -> Camera:
+def camera_in(camera: Camera, frame: SceneFrame) -> Camera:
     """Return a camera in a frame."""
     focus, height = (length and length * frame.unit for length in (camera.focus_distance, camera.view_height))
     return replace(camera, position=frame.point(camera.position), look_at=frame.point(camera.look_at),
                    aperture_radius=camera.aperture_radius * frame.unit, focus_distance=focus, view_height=height)
 
 
-def _sphere(sphere: Sphere, frame: Frame) -> Sphere:
+def _sphere(sphere: Sphere, frame: SceneFrame) -> Sphere:
     return replace(sphere, center=frame.point(sphere.center), radius=sphere.radius * frame.unit,
                    material=sphere.material.in_unit(frame.unit))
 
 
-def _light(light: Light, frame: Frame) -> Light:
+def _light(light: Light, frame: SceneFrame) -> Light:
     if isinstance(light, DirectionalLight):
         return light
     red, green, blue = (value * frame.unit**2 for value in light.intensity)

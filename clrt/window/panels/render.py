@@ -13,7 +13,7 @@ from ...output.view_transform import VIEWS
 from ...scene.validation.limits import Ge, Le
 from ..editor import Editor
 from ..fields import choose, edit, edit_fields
-from ..tone_mapping import Look
+from ..tone_mapping import DisplaySettings
 
 #: Settings with a fixed set of values, by name; None selects automatically by device and scene.
 CHOICES: dict[str, list[Any]] = {"tree": [None, True, False], "builder": [None, *BUILDER_NAMES],
@@ -34,8 +34,9 @@ def show(editor: Editor) -> None:
     if settings is not editor.settings:
         editor.choose(settings)
     imgui.separator_text("Display")
-    editor.look = Look(choose("view", [*VIEWS, "aces"], editor.look.view),
-                       edit("exposure", Annotated[float, Ge(-10), Le(10)], editor.look.exposure, editor.step))
+    exposure = Annotated[float, Ge(-10), Le(10)]
+    editor.look = DisplaySettings(choose("view", [*VIEWS, "aces"], editor.look.view),
+                                  edit("exposure", exposure, editor.look.exposure, editor.step))
     imgui.pop_id()
 
 

@@ -12,7 +12,7 @@ from ....scene.model import Mesh
 from ..records import NORMALS, SPHERE, TRIANGLE
 
 
-class Corners:
+class TriangleCorners:
     """Corners of all meshes' triangles, (m, 3, 3) float32, computed on each conversion to a numpy array: they take
     twice the memory of the meshes, and only as long as the array is referenced."""
 

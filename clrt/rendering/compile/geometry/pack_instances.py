@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....accel.bvh import Triangles
-from ....accel.two_level import TwoLevels, inverse
+from ....accel.two_level import TwoLevelBvh, inverse
 from ....device.open import Device
 from ....scene.geometry.instancing import prototypes
 from ....scene.model import Instance
@@ -24,7 +24,7 @@ IntArray = NDArray[np.int64]
 ROUNDINGS = 12 * 2.0**-24
 
 
-class Placements:
+class PackedInstances:
     """Instances of meshes, after the rest: everything placed directly in the world, if there is any.
 
     meshes: those that instances show; their triangles are stored one mesh after another, followed by those of the rest.
@@ -42,10 +42,10 @@ class Placements:
         self.mesh = np.concatenate([np.full(len(itself), len(self.meshes), np.int32), which])
 
     def levels(self, device: Device | None, layout: str, builder: str | None, triangles: Triangles,
-               spheres: FloatArray, test: str) -> TwoLevels:
+               spheres: FloatArray, test: str) -> TwoLevelBvh:
         """Return the BVHs over triangles, stored as above, and spheres (s, 4), which belong to the rest."""
         meshes = np.split(np.asarray(triangles), self.starts[1:])
-        return TwoLevels(device, layout, builder, meshes, self.mesh, test, spheres)
+        return TwoLevelBvh(device, layout, builder, meshes, self.mesh, test, spheres)
 
     def records(self, codes: NDArray[np.int32]) -> NDArray[Any]:
         """Return PLACEMENT records. codes: (k,) int32, of the instances' materials."""
@@ -62,7 +62,7 @@ class Placements:
 
 
 @dataclass(frozen=True)
-class Objects:
+class ObjectIds:
     """Mapping from packed primitives to a scene's objects. faces: (m,) triangle counts of the meshes of the rest;
     spheres: their number.
 

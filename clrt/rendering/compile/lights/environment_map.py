@@ -24,7 +24,7 @@ MOST_DIRECTED = 0.9
 
 
 @dataclass(frozen=True)
-class Sky:
+class EnvironmentMap:
     """The environment for the kernels: a kernel file (None for a black sky) and buffers.
 
     irradiance: approximate irradiance (luminance) due to the sampled part: a scalar and a vector, (4,), meaning scalar
@@ -36,7 +36,7 @@ class Sky:
     irradiance: Doubles | None = None
 
 
-def pack_sky(environment: Environment) -> Sky:
+def pack_sky(environment: Environment) -> EnvironmentMap:
     """Pack the sky of an Environment.
 
     Only the radiance above the mean is sampled: the rest arrives uniformly from all directions, for which BSDF sampling
@@ -48,9 +48,11 @@ def pack_sky(environment: Environment) -> Sky:
     if image is None:
         color = np.asarray(environment.color) * environment.strength
         record["color"] = color
-        return Sky("light/constant_sky.cl", {"environment": ("Environment", record)}) if color.any() else Sky(None, {})
+        if not color.any():
+            return EnvironmentMap(None, {})
+        return EnvironmentMap("light/constant_sky.cl", {"environment": ("Environment", record)})
     if not image.any() or not environment.strength:
-        return Sky(None, {})
+        return EnvironmentMap(None, {})
     height, width = image.shape[:2]
     angle = np.radians(environment.rotation_degrees)
     record["width"], record["height"] = width, height
@@ -65,7 +67,7 @@ def pack_sky(environment: Environment) -> Sky:
     mean -= overall
     moment = np.einsum("hw,hw,hw,h", mean, mean, mean, solid_angle[:, 0]) / (4 * np.pi)
     if moment <= UNEVEN * overall**3:
-        return Sky("light/image_sky.cl", buffers)
+        return EnvironmentMap("light/image_sky.cl", buffers)
     weights = np.maximum(mean, 0, out=mean)
     weights *= solid_angle
     of_rows = weights.sum(axis=1)
@@ -76,7 +78,7 @@ def pack_sky(environment: Environment) -> Sky:
     density *= steps(of_rows[None], table[height * width:][None]).T
     texels["density"] = density * (width * height)
     buffers["sky_steps"] = ("SkyStep", table)
-    return Sky("light/image_sky.cl", buffers, irradiance)
+    return EnvironmentMap("light/image_sky.cl", buffers, irradiance)
 
 
 def _fill_radiance(texels: NDArray[np.void], image: NDArray[np.float32], strength: float) -> Doubles:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ....accel.bvh import Tree
+from ....accel.bvh import Bvh
 
 Doubles = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def joined(parts: Sequence[LightGroups]) -> LightGroups:
     return LightGroups(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(LightGroups)))
 
 
-def groups_of_nodes(tree: Tree, lights: LightGroups) -> LightGroups:
+def groups_of_nodes(tree: Bvh, lights: LightGroups) -> LightGroups:
     """Return the light bounds of the nodes of a binary BVH over `lights`, with one light per leaf.
 
     The axis is the mean of the normals, weighted by intensity; the cone around it is as narrow as possible.

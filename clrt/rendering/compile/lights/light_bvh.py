@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....accel.builders import midpoint
-from ....accel.bvh import Tree
+from ....accel.bvh import Bvh
 from ..records import LIGHT_GROUP
 from .light_bounds import Doubles, LightGroups, groups_of_nodes
 
@@ -53,7 +53,7 @@ def light_tree(lights: LightGroups, first: int, others: int) -> tuple[NDArray[An
     return records, places
 
 
-def _divided(tree: Tree, size: Doubles, nodes: Integers, width: int) -> Integers:
+def _divided(tree: Bvh, size: Doubles, nodes: Integers, width: int) -> Integers:
     """Return (k·width,): the parts into which k nodes of the binary BVH are divided, the largest first; −1 for none."""
     parts = np.full((len(nodes), width), -1, np.int64)
     parts[:, 0] = nodes

@@ -17,7 +17,7 @@ FEW = 32
 
 
 @dataclass(frozen=True)
-class LightChoice:
+class LightSampler:
     """Light sampling data. choices: number of entries to choose from, the last `infinite` of them infinite lights; 0
     without lights, and 1 if there is nothing to choose. tree: whether a light BVH is traversed below the chosen entry.
     """
@@ -33,7 +33,7 @@ class LightChoice:
         return ["light/choice.cl" if self.choices > 1 else "light/only.cl"] if self.choices else []
 
 
-def pack_choice(lights: LightGroups, infinite: Doubles) -> LightChoice:
+def pack_choice(lights: LightGroups, infinite: Doubles) -> LightSampler:
     """Pack the data for n finite lights, numbered 0 to n − 1, and for the infinite ones after them, (k, 4).
 
     Each infinite light is a scalar and a vector: for a normal n, its irradiance is about scalar + vector·n, or 0 if
@@ -42,7 +42,7 @@ def pack_choice(lights: LightGroups, infinite: Doubles) -> LightChoice:
     first = min(len(lights), FEW)
     choices = first + len(infinite)
     if choices < 2:
-        return LightChoice(choices)
+        return LightSampler(choices)
     # Keeps importances in the range of floats, whatever the unit of radiance is.
     scale = max(lights.intensity.sum(), np.abs(infinite).max(initial=0))
     lights = replace(lights, intensity=lights.intensity / scale)
@@ -56,4 +56,4 @@ def pack_choice(lights: LightGroups, infinite: Doubles) -> LightChoice:
     endless["intensity"], endless["axis"] = infinite[:, 0] / scale, infinite[:, 1:] / scale
     endless["below"] = ~np.arange(len(lights), len(lights) + len(infinite))
     buffers["light_groups"] = ("LightGroup", groups)
-    return LightChoice(choices, len(infinite), len(lights) > FEW, buffers)
+    return LightSampler(choices, len(infinite), len(lights) > FEW, buffers)

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from ....scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ....scene.materials.textures import Texture
 from ....scene.model import Scene
-from ..materials.pack_textures import Textures
+from ..materials.pack_textures import PackedTextures
 from ..records import DIRECTIONAL_LIGHT, POINT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT, SUN_LIGHT
-from .environment_map import LUMINANCE, Sky
+from .environment_map import LUMINANCE, EnvironmentMap
 from .hidden_lights import hidden_lights, opaque_and_sides
 from .light_bounds import Doubles, joined, round_lights, spot_lights
-from .light_sampler import LightChoice, pack_choice
+from .light_sampler import LightSampler, pack_choice
 from .triangle_lights import pack_triangle_lights
 
 #: Light types in the order of their numbers, infinite ones last; the kernel file is light/<name>.cl, except for the
@@ -31,7 +31,7 @@ STEEPEST = 1e-30
 
 
 @dataclass(frozen=True)
-class Emitters:
+class PackedLights:
     """Packed lights. buffers: name → (C type, records). counts: lights by type. triangle, sphere: light of each, or −1.
     """
 
@@ -39,7 +39,7 @@ class Emitters:
     counts: dict[str, int]
     triangle: NDArray[np.int32]
     sphere: NDArray[np.int32]
-    choice: LightChoice
+    choice: LightSampler
 
     @property
     def types(self) -> list[str]:
@@ -52,7 +52,7 @@ class Emitters:
         return sum(self.counts.values())
 
 
-def pack_emitters(scene: Scene, sky: Sky, textures: Textures) -> Emitters:
+def pack_emitters(scene: Scene, sky: EnvironmentMap, textures: PackedTextures) -> PackedLights:
     """Pack all lights of the scene that are not black."""
     flat = pack_triangle_lights(scene.meshes, textures)
     balls, points, spots = _sphere_lights(scene, textures), _point_lights(scene), _spot_lights(scene)
@@ -75,7 +75,7 @@ def pack_emitters(scene: Scene, sky: Sky, textures: Textures) -> Emitters:
                     _luminance(spots, "intensity"))])
     choice = pack_choice(groups, infinite)
     buffers = {f"{kind}_lights": (f"{kind.title()}Light", records[kind]) for kind in counts if kind != "sky"}
-    return Emitters(buffers | choice.buffers, counts, flat.light, of_sphere, choice)
+    return PackedLights(buffers | choice.buffers, counts, flat.light, of_sphere, choice)
 
 
 def light_type(light: Light) -> str | None:
@@ -85,7 +85,7 @@ def light_type(light: Light) -> str | None:
     return light.kernel if any(light.intensity) else None
 
 
-def _sphere_lights(scene: Scene, textures: Textures) -> NDArray[Any]:
+def _sphere_lights(scene: Scene, textures: PackedTextures) -> NDArray[Any]:
     lamps = [(i, sphere) for i, sphere in enumerate(scene.spheres) if any(sphere.material.radiance)]
     opaque, sides = opaque_and_sides([sphere.material for _, sphere in lamps])
     shapes = np.array([(*sphere.center, sphere.radius) for _, sphere in lamps], np.float64).reshape(-1, 4)

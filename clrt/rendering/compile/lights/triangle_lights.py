@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ....scene.materials.textures import Texture
 from ....scene.model import Mesh
-from ..geometry.pack_geometry import Corners
-from ..materials.pack_textures import Textures
+from ..geometry.pack_geometry import TriangleCorners
+from ..materials.pack_textures import PackedTextures
 from ..records import TRIANGLE_LIGHT
 from .environment_map import LUMINANCE
 from .hidden_lights import hidden_lights, opaque_and_sides
@@ -33,7 +33,7 @@ class TriangleLights(NamedTuple):
     light: NDArray[np.int32]
 
 
-def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLights:
+def pack_triangle_lights(meshes: list[Mesh], textures: PackedTextures) -> TriangleLights:
     """Pack the emissive triangles of the meshes, in order, except for those that are black, have no area in float32, or
     are hidden by an earlier one in the same place.
 
@@ -48,7 +48,7 @@ def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLigh
     shines: NDArray[np.bool_] = np.any(emission, axis=1)
     lamps = np.flatnonzero(shines[mesh])
     around = np.concatenate([np.ones((0, 3)), *map(mean_emission, itertools.compress(meshes, shines))])
-    corners = np.asarray(Corners(list(itertools.compress(meshes, shines)))).astype(np.float64)
+    corners = np.asarray(TriangleCorners(list(itertools.compress(meshes, shines)))).astype(np.float64)
     area = _normals(corners)[1] / 2
     opaque, sides = opaque_and_sides([each.material for each in meshes])
     seen = (emission[mesh[lamps]] * around).any(axis=1) & (area.astype(np.float32) > 0)

@@ -14,13 +14,13 @@ from ....scene.materials.material import Culling, as_color
 from ....scene.materials.material_types import MATERIALS, Material
 from ....scene.materials.textures import Texture
 from ..records import LAYER_PARTS, material_record
-from .pack_textures import Textures
+from .pack_textures import PackedTextures
 
 Number = float | tuple[float, ...] | int
 
 
 @dataclass(frozen=True)
-class Materials:
+class PackedMaterials:
     """Packed materials. codes: (users,) int32, each user's type | index << 4. buffers: records of each type, by kernel.
     reads: by `kernel_parameter`, whether some material of the type reads it from a texture. features: those of each
     type."""
@@ -49,7 +49,7 @@ class Materials:
         return bool(self.mapped("normal_map") or self.mapped("clearcoat_normal_map"))
 
 
-class Tables:
+class MaterialTables:
     """Tables of all materials, without duplicates."""
 
     def __init__(self) -> None:
@@ -71,7 +71,8 @@ class Tables:
         return {"layer_entries": ("LayerParts", np.ascontiguousarray(entries).view(LAYER_PARTS).ravel())}
 
 
-def pack_materials(users: Iterable[Material], textures: Textures, tables: Tables, culling: Culling) -> Materials:
+def pack_materials(users: Iterable[Material], textures: PackedTextures, tables: MaterialTables,
+                   culling: Culling) -> PackedMaterials:
     """Pack the materials of these users without duplicates, adding their textures to `textures` and their tables to
     `tables`; culling: back-face culling mode."""
     distinct: dict[type[Material], dict[Material, int]] = {}
@@ -102,10 +103,11 @@ def pack_materials(users: Iterable[Material], textures: Textures, tables: Tables
         reads |= {f"{kind.kernel}_{name}": f"{name}_texture" in names for name in sorted(names)
                   if not name.endswith("_texture")}
     features = {kind: frozenset[str]().union(*(material.features() for material in distinct[kind])) for kind in used}
-    return Materials(np.array(codes, np.int32), buffers, reads, used, features)
+    return PackedMaterials(np.array(codes, np.int32), buffers, reads, used, features)
 
 
-def _values(material: Material, textures: Textures, tables: Tables, culling: Culling) -> dict[str, Number]:
+def _values(material: Material, textures: PackedTextures, tables: MaterialTables,
+            culling: Culling) -> dict[str, Number]:
     """Return the values of its record: a texture's factor, and its number as NAME_texture; a table's first entry."""
     parameters = material.parameters()
     parameters |= material.surface_parameters(culling)

@@ -12,7 +12,7 @@ from ....scene.materials.textures import Channel, Picture, Texture, Wrap
 from ..records import LINEAR, TEXEL, TEXTURE
 
 
-class Textures:
+class PackedTextures:
     """Textures of one scene, numbered in the order of their first use."""
 
     def __init__(self) -> None:

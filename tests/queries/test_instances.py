@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import clrt
 from clrt.device.open import Device
 
-from .covering import covering
+from ..covering import covering
 
 Doubles = NDArray[np.float64]
 RNG = np.random.default_rng(11)

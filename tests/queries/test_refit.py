@@ -12,8 +12,8 @@ import clrt
 from clrt.accel.wide import EMPTY
 from clrt.device.open import Device
 
-from .accel.cases import edges
-from .rendering.rays import icosphere
+from ..accel.cases import edges
+from ..rendering.rays import icosphere
 from .test_instances import LAYOUTS, MESHES, transforms
 
 Floats = NDArray[np.float32]

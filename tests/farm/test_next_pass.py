@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.farm.next_pass import Ahead
-from clrt.rendering.accumulation.work_queue import Part, Work
+from clrt.farm.next_pass import NextPass
+from clrt.rendering.accumulation.work_queue import WorkPart, WorkQueue
 from clrt.rendering.film.tiles import TILE_PIXELS
 
 PIXEL = np.dtype([("count", np.int64)])
@@ -18,8 +18,8 @@ def test_every_pass_ends_as_if_all_had_waited(seed: int) -> None:
     """Tasks of random sizes end in any order and some are returned; the third pass differs from the one that was begun
     early."""
     rng = np.random.default_rng(seed)
-    work, ahead = Work(np.zeros(TILES, np.int64)), Ahead(np.zeros((36, TILE_PIXELS), PIXEL))
-    in_flight: list[tuple[Work, Part]] = []
+    work, ahead = WorkQueue(np.zeros(TILES, np.int64)), NextPass(np.zeros((36, TILE_PIXELS), PIXEL))
+    in_flight: list[tuple[WorkQueue, WorkPart]] = []
     early = 0
     work.add_to_all(5)
     for following, end in ((7, 5), (4, 12), (9, 14)):

@@ -18,7 +18,7 @@ from clrt.device.open import Device
 from clrt.errors import DeviceError
 from clrt.rendering.checkpoint.identity import scene_hash
 
-from .covering import covering
+from ..covering import covering
 
 RNG = np.random.default_rng(8)
 VERTICES, FACES = RNG.random((60, 3)), RNG.integers(0, 60, (120, 3))

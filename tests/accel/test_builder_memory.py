@@ -9,7 +9,7 @@ import pytest
 
 from clrt.accel.build import LARGE, build_tree
 from clrt.accel.device_builder import LARGEST_ARRAY, SHAPES
-from clrt.device.launches.data_parallel import Blocks
+from clrt.device.launches.data_parallel import DataParallel
 from clrt.device.open import Device
 from clrt.errors import NoRoomError
 
@@ -22,13 +22,13 @@ def test_no_array_is_larger_than_foretold(device: Device, monkeypatch: pytest.Mo
                                           builder: str) -> None:
     """Tests clustered triangles, large overlapping ones, and triangles with spheres."""
     sizes: list[int] = []
-    counted = Blocks._counted
+    counted = DataParallel._counted
 
-    def noted(work: Blocks, array: cl.Buffer) -> cl.Buffer:
+    def noted(work: DataParallel, array: cl.Buffer) -> cl.Buffer:
         sizes.append(array.size)
         return counted(work, array)
 
-    monkeypatch.setattr(Blocks, "_counted", noted)
+    monkeypatch.setattr(DataParallel, "_counted", noted)
     for triangles, balls in ((soup(20_000, 0.01), 0), (soup(20_000, 0.9), 0), (soup(12_000, 0.2), 8_000)):
         sizes.clear()
         build_tree(device, layout, builder, triangles, spheres(balls))

@@ -11,9 +11,9 @@ import clrt
 from clrt.accel.traversal_kernels import SPHERE_TESTS
 from clrt.device.open import Device
 
-from .accel.cases import soup, spheres
-from .covering import others
-from .rendering.rays import hit_spheres, hit_triangles
+from ..accel.cases import soup, spheres
+from ..covering import others
+from ..rendering.rays import hit_spheres, hit_triangles
 
 WAYS = [("bvh8", "single"), ("bvh8", "packet"), ("bvh8", "pool"), ("bvh2", None), ("cwbvh", None), ("packs", None),
         ("list", None)]

@@ -12,7 +12,7 @@ SPARE = 0.25
 LEAST_PART = 0.25
 
 
-class Pace:
+class ImageSizing:
     """Chooses the size of the next image from the times of previous ones."""
 
     def __init__(self) -> None:

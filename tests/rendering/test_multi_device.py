@@ -13,9 +13,9 @@ from clrt.device.launches.launch import Launches
 from clrt.device.open import Device
 from clrt.errors import DeviceError, KernelError
 from clrt.rendering.accumulation import scene_on_device
-from clrt.rendering.accumulation.device_worker import Worker
-from clrt.rendering.accumulation.multi_device import Crew
-from clrt.rendering.accumulation.single_device import Session
+from clrt.rendering.accumulation.device_worker import DeviceWorker
+from clrt.rendering.accumulation.multi_device import MultiDeviceAccumulation
+from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.renderer import Renderer
 
 from .checkpoints import SIZE, renderer, run, same
@@ -45,7 +45,8 @@ def test_same_picture(device: Device, adaptive: bool, stops: dict[str, float], c
     alone, together = renderer(device, adaptive=adaptive), crew(device, count, adaptive=adaptive)
     run(alone, **stops)
     run(together, **stops)
-    assert isinstance(alone.session, Session) and isinstance(together.session, Crew) and same(alone, together)
+    assert isinstance(alone.session, SingleDeviceAccumulation)
+    assert isinstance(together.session, MultiDeviceAccumulation) and same(alone, together)
     assert sum(worker.samples > 0 for worker in together.session.workers) >= 2
 
 
@@ -92,7 +93,7 @@ def test_one_that_fails_is_left_out(device: Device, small_launches: None, caplog
     at_once = renderer(device)
     run(at_once, spp=24)
     running = crew(device, 3)
-    assert isinstance(running.session, Crew)
+    assert isinstance(running.session, MultiDeviceAccumulation)
     _fail_after(running.session.workers[1], where, when, monkeypatch)
     run(running, spp=24)
     assert len(running.session.workers) == 2
@@ -104,7 +105,7 @@ def test_none_left(device: Device, small_launches: None, tmp_path: Path, monkeyp
     """The render ends with the last device's error, and resuming its checkpoint gives the same image."""
     at_once, running = renderer(device), crew(device, 2, checkpoint=tmp_path / "a.ck")
     run(at_once, spp=24)
-    assert isinstance(running.session, Crew)
+    assert isinstance(running.session, MultiDeviceAccumulation)
     for when, worker in zip((12, 20), list(running.session.workers)):
         _fail_after(worker, "ended", when, monkeypatch)
     with pytest.raises(DeviceError, match="out of order"):
@@ -114,7 +115,7 @@ def test_none_left(device: Device, small_launches: None, tmp_path: Path, monkeyp
     assert same(at_once, again)
 
 
-def _fail_after(worker: Worker, where: str, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def _fail_after(worker: DeviceWorker, where: str, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
     method, left = getattr(worker, where), [calls]
 
     def fails(*arguments: Any) -> Any:

@@ -15,9 +15,9 @@ from clrt.accel.traversal_kernels import TRIANGLE_TESTS
 from clrt.accel.triangle_forms import FORMS, in_form
 from clrt.device.open import Device
 
-from .accel.cases import NO_SPHERES, soup
-from .covering import covering, others
-from .rendering.rays import hit_triangles, icosphere
+from ..accel.cases import NO_SPHERES, soup
+from ..covering import covering, others
+from ..rendering.rays import hit_triangles, icosphere
 from .test_instances import MESHES, transforms
 
 VARIANTS = [name for name in TRIANGLE_TESTS if name != "watertight"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.rendering.accumulation.work_queue import Part, Work
+from clrt.rendering.accumulation.work_queue import WorkPart, WorkQueue
 from clrt.rendering.film.tiles import RUN, row_by_row, scattered, tile_by_tile
 
 
@@ -13,13 +13,13 @@ from clrt.rendering.film.tiles import RUN, row_by_row, scattered, tile_by_tile
 def test_samples_come_once_and_in_their_order(seed: int) -> None:
     """Parts of all sizes are in flight together, finish in any order, and some fail and are given back."""
     rng = np.random.default_rng(seed)
-    work, done = Work(np.zeros((5, 7), np.int64)), np.zeros(35, np.int64)
-    in_flight: list[Part] = []
+    work, done = WorkQueue(np.zeros((5, 7), np.int64)), np.zeros(35, np.int64)
+    in_flight: list[WorkPart] = []
     for step in range(4):
         if step % 2:
             work.double(rng.permutation(35)[:rng.integers(1, 36)])
         else:
-            work = Work(np.full((5, 7), done.max()))
+            work = WorkQueue(np.full((5, 7), done.max()))
             done[:] = done.max()
             work.add_to_all(int(rng.integers(1, 40)))
         while work.parts or in_flight:
@@ -43,7 +43,7 @@ def test_samples_come_once_and_in_their_order(seed: int) -> None:
 def test_what_was_lost_is_in_hand_again(seed: int) -> None:
     """Parts with unknown outcome, some of them rendered: the film's sample counts decide what is left."""
     rng = np.random.default_rng(seed)
-    work, done = Work(rng.integers(0, 3, (5, 7))), np.zeros(35, np.int64)
+    work, done = WorkQueue(rng.integers(0, 3, (5, 7))), np.zeros(35, np.int64)
     done[:] = work.samples.ravel()
     work.double(rng.permutation(np.flatnonzero(done))[:20])
     expected = work.then.copy()
@@ -57,15 +57,15 @@ def test_what_was_lost_is_in_hand_again(seed: int) -> None:
 
 
 @pytest.mark.parametrize("most, least, expected", [
-    (100, 1, Part(0, 10, 3, 8)), (16, 1, Part(0, 2, 3, 8)), (4, 1, Part(0, 1, 3, 4)), (4, 4, Part(0, 4, 3, 1)),
-    (0, 5, Part(0, 5, 3, 1)), (40, 10, Part(0, 10, 3, 4))])
-def test_a_share_is_no_larger_than_asked(most: int, least: int, expected: Part) -> None:
+    (100, 1, WorkPart(0, 10, 3, 8)), (16, 1, WorkPart(0, 2, 3, 8)), (4, 1, WorkPart(0, 1, 3, 4)),
+    (4, 4, WorkPart(0, 4, 3, 1)), (0, 5, WorkPart(0, 5, 3, 1)), (40, 10, WorkPart(0, 10, 3, 4))])
+def test_a_share_is_no_larger_than_asked(most: int, least: int, expected: WorkPart) -> None:
     """In tiles times samples, down to one sample of the fewest tiles; the remainder is queued after the other tiles."""
-    work = Work(np.full((2, 5), 3))
+    work = WorkQueue(np.full((2, 5), 3))
     work.add_to_all(8)
     assert work.cut(most, least) == expected and work.left == 80 - (expected.end - expected.first) * expected.more
     if expected.more < 8:
-        assert work.parts[-1] == Part(0, expected.end, 3 + expected.more, 8 - expected.more)
+        assert work.parts[-1] == WorkPart(0, expected.end, 3 + expected.more, 8 - expected.more)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 64, 100, 1023, 4096])

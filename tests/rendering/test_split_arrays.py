@@ -14,8 +14,8 @@ from clrt.device.launches.memory_plan import OVERLAP, part_count, part_records, 
 from clrt.device.open import Device
 from clrt.errors import NoRoomError, UsageError
 from clrt.rendering.accumulation.denoiser_guides import render_guides
-from clrt.rendering.accumulation.multi_device import Crew
-from clrt.rendering.accumulation.single_device import Session
+from clrt.rendering.accumulation.multi_device import MultiDeviceAccumulation
+from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.renderer import Renderer
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Mesh, Scene, Sphere
@@ -75,10 +75,10 @@ def buffers_of(running: Renderer) -> list[cl.Buffer]:
 def assert_same_in_parts(device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch, layout: str,
                          limit: int) -> Renderer:
     """Return the renderer whose largest buffer has `limit` KiB, after checking that its image is that of `whole`."""
-    assert isinstance(whole[0].session, Session) and whole[0].compiled.part_bytes is None
+    assert isinstance(whole[0].session, SingleDeviceAccumulation) and whole[0].compiled.part_bytes is None
     monkeypatch.setenv(VARIABLE, f"{limit}K")
     running, found = film(device, layout, whole[0].scene.render.integrator)
-    assert isinstance(running.session, Crew) and found == whole[1]
+    assert isinstance(running.session, MultiDeviceAccumulation) and found == whole[1]
     assert max(buffer.size for buffer in buffers_of(running)) <= limit << 10
     return running
 
@@ -88,7 +88,7 @@ def test_only_the_film_is_too_large(device: Device, whole: tuple[Renderer, bytes
     """The program is the one for large buffers, except for the location of the film's pixels."""
     monkeypatch.setenv(VARIABLE, "80K")
     running, found = film(device, "bvh8")
-    assert isinstance(running.session, Crew) and found == whole[1]
+    assert isinstance(running.session, MultiDeviceAccumulation) and found == whole[1]
     assert running.compiled.part_bytes is None and running.compiled.source == whole[0].compiled.source
 
 
@@ -151,7 +151,7 @@ def test_where_there_is_no_room_windows_are_halved(device: Device, monkeypatch: 
     monkeypatch.setattr("clrt.rendering.accumulation.device_worker.FEWEST_TILES", 4)
     running = Renderer(scene(), device=device.info.index, layout="bvh8", spp=4, size=(90, 66))
     state = list(running.passes(spp=4))[-1]
-    assert isinstance(running.session, Crew) and running.session.workers[0].window_tiles == 13
+    assert isinstance(running.session, MultiDeviceAccumulation) and running.session.workers[0].window_tiles == 13
     monkeypatch.undo()
     again = Renderer(scene(), device=device.info.index, layout="bvh8", spp=4, size=(90, 66))
     assert state.film.pixels.tobytes() == list(again.passes(spp=4))[-1].film.pixels.tobytes()

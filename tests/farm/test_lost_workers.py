@@ -18,7 +18,7 @@ from clrt.cli.goal import Goal
 from clrt.cli.progress import PlainProgress
 from clrt.errors import UsageError
 from clrt.farm import worker_tasks
-from clrt.farm.banded_picture import Banded
+from clrt.farm.banded_picture import BandedPicture
 from clrt.farm.cluster import Cluster
 from clrt.farm.farm_renderer import FarmRenderer
 from clrt.farm.local_processes import Processes
@@ -107,7 +107,7 @@ def band(**differs: Any) -> dict[str, Any]:
 
 def test_what_bands_say_together(tmp_path: Path) -> None:
     """Figures of a single band are not reported for the whole."""
-    banded = Banded(PictureOrder(room(), {"size": SIZE}, spp=4), tmp_path / "a.bands")
+    banded = BandedPicture(PictureOrder(room(), {"size": SIZE}, spp=4), tmp_path / "a.bands")
     banded.reports = {name: band(device="one", seconds=seconds, samples_per_second=6144 / seconds, rays_per_second=1.0,
                                  stop_reason="error", tile_noise=0.02) for name, seconds in (("a", 1.0), ("b", 9.0))}
     told = banded.summary()
@@ -119,7 +119,7 @@ def test_what_bands_say_together(tmp_path: Path) -> None:
 
 def test_bands_warn_of_the_whole_picture(tmp_path: Path) -> None:
     """Warnings cover the samples dropped in all bands, the bias of all, and an image that is black everywhere."""
-    banded = Banded(PictureOrder(room(), {"size": SIZE, "clamp_direct": 1.0}, spp=4), tmp_path / "a.bands")
+    banded = BandedPicture(PictureOrder(room(), {"size": SIZE, "clamp_direct": 1.0}, spp=4), tmp_path / "a.bands")
     banded.reports = {"a": band(samples=100, nonfinite_samples=3, brightest=0.0, light=3.0, clamped_part=0.25),
                       "b": band(samples=100, nonfinite_samples=4, light=1.0, clamped_part=0.5)}
     first, dropped, biased = banded.summary()["warnings"]

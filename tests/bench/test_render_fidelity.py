@@ -21,7 +21,7 @@ from clrt.errors import UsageError
 from clrt.formats.images.image_reader import linear_from_srgb
 from clrt.output.image import Image
 from clrt.output.view_transform import srgb
-from ..scene.glb import Gltf
+from ..formats.glb import Gltf
 
 pytestmark = pytest.mark.needs("flip_evaluator")
 SIZE = 32
