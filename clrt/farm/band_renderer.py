@@ -12,7 +12,7 @@ from ..output.image import Image
 from ..rendering.accumulation.accumulation import Accumulation
 from ..rendering.accumulation.device_pool import DevicePool
 from ..rendering.accumulation.launch_plan import depth_of
-from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_team
+from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_pool
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
 from ..rendering.film.tiles import TILE, tiles_of
 from ..rendering.render_report import render_report
@@ -28,7 +28,7 @@ _kept: dict[str, Renderer] = {}
 class BandRenderer(Renderer):
     """Renderer of some tile rows of an image, as if they were all of it: the size in pixels is the session's."""
 
-    _team: DevicePool | None = None
+    _pool: DevicePool | None = None
     _band = (0, 1)
 
     def show(self, band: tuple[int, int]) -> None:
@@ -40,9 +40,9 @@ class BandRenderer(Renderer):
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
         settings, (first, end) = self.settings, self._band
         (width, height), columns = settings.size, tiles_of(settings.size)[1]
-        self._team = self._team or make_team(self.devices, self._compiled, settings.size, depth_of(settings),
+        self._pool = self._pool or make_pool(self.devices, self._compiled, settings.size, depth_of(settings),
                                              settings.seed, self._planned_spp)
-        return MultiDeviceAccumulation(self._team, (width, min(end * TILE, height) - first * TILE), first * columns)
+        return MultiDeviceAccumulation(self._pool, (width, min(end * TILE, height) - first * TILE), first * columns)
 
 
 def render(key: str, order: PictureOrder) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rendering.accumulation.launch_plan import depth_of
-from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_team
+from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_pool
 from ..rendering.accumulation.work_queue import WorkPart, WorkQueue
 from ..rendering.compile.choices import choices_on
 from ..rendering.compile.scene_compiler import SceneCompiler
@@ -32,9 +32,9 @@ class ShareRenderer:
         devices = opened(order.devices)
         compiled = SceneCompiler(devices).compile(order.scene,
                                                   [choices_on(each, order.asked, order.lanes) for each in devices])
-        self._team = make_team(devices, compiled, settings.size, depth_of(settings), settings.seed, order.planned_spp)
+        self._pool = make_pool(devices, compiled, settings.size, depth_of(settings), settings.seed, order.planned_spp)
         # Its film uses no memory while it is empty.
-        self._picture = MultiDeviceAccumulation(self._team, settings.size)
+        self._picture = MultiDeviceAccumulation(self._pool, settings.size)
         self._pixel = compiled[0].choices.pixel
 
     def share(self, tiles: NDArray[np.uint32], first: int, more: int, pixels: NDArray[Any] | None) -> NDArray[Any]:
@@ -44,7 +44,7 @@ class ShareRenderer:
         work = WorkQueue(np.full((1, count), first, np.int64))
         work.take(np.arange(count), [WorkPart(0, count, first, more)])
         with _at_work:
-            for _ in self._team.run(work, film, tiles):
+            for _ in self._pool.run(work, film, tiles):
                 pass
         return film
 

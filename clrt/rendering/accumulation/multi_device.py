@@ -1,4 +1,4 @@
-"""Accumulation with the film on the host: on several devices (team.py), or on one that has no room for the film."""
+"""Accumulation with the film on the host: on several devices, or on one that has no room for the film."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ PASS_LAUNCHES = 12
 
 
 class MultiDeviceAccumulation(LocalAccumulation):
-    """Accumulation of the image of a team's scene, or of a band of it: then `size` is the band's, as wide as the image,
+    """Accumulation of the image of a pool's scene, or of a band of it: then `size` is the band's, as wide as the image,
     and `first_tile` is its first tile."""
 
-    def __init__(self, team: DevicePool, size: tuple[int, int], first_tile: int = 0) -> None:
+    def __init__(self, pool: DevicePool, size: tuple[int, int], first_tile: int = 0) -> None:
         super().__init__(size)
-        self.team, self.first_tile = team, first_tile
+        self.pool, self.first_tile = pool, first_tile
         tiles, pixel = self.work.samples.size, self.compiled.choices.pixel
         check_host(tiles * TILE_PIXELS * pixel.itemsize, *size)
         self._film = np.zeros((tiles, TILE_PIXELS), pixel)
@@ -42,7 +42,7 @@ class MultiDeviceAccumulation(LocalAccumulation):
     @property
     def workers(self) -> list[DeviceWorker]:
         """Workers that are still in use."""
-        return self.team.workers
+        return self.pool.workers
 
     @property
     def scene(self) -> SceneOnDevice:
@@ -56,19 +56,19 @@ class MultiDeviceAccumulation(LocalAccumulation):
 
     def shares(self) -> list[dict[str, Any]]:
         """Return what each device rendered, for the report."""
-        return self.team.shares()
+        return self.pool.shares()
 
     @property
     def longest_launch(self) -> float:
         """Duration of the longest launch in seconds, including its transfers."""
-        return max(worker.launches.longest for worker in self.team.everyone)
+        return max(worker.launches.longest for worker in self.pool.everyone)
 
     @property
     def _busy(self) -> bool:
-        return bool(self.work.parts or self.team.at)
+        return bool(self.work.parts or self.pool.at)
 
     def _work(self) -> Iterator[None]:
-        return self.team.run(self.work, self._film, self._numbers)
+        return self.pool.run(self.work, self._film, self._numbers)
 
     def _clear(self) -> None:
         self._film.fill(0)
@@ -76,7 +76,7 @@ class MultiDeviceAccumulation(LocalAccumulation):
     def wait(self) -> None:
         """Wait for the launches in flight, without starting pending work."""
         with self._tearing():
-            self.team.drain(self.work, self._film)
+            self.pool.drain(self.work, self._film)
             self._settle()
 
     def pass_limit(self) -> int:
@@ -97,10 +97,10 @@ class MultiDeviceAccumulation(LocalAccumulation):
         self.work, self._film = work, tile_by_tile(film.pixels)
 
 
-def make_team(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
+def make_pool(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
               seed: int, planned_spp: int | None, tiles: int | None = None,
               before: Sequence[SceneOnDevice] = ()) -> DevicePool:
-    """Return a team for the image of this size; tiles: the maximum number of tiles of a film, all by default; before:
+    """Return a pool for the image of this size; tiles: the maximum number of tiles of a film, all by default; before:
     see `SceneOnDevice`."""
     rows, columns = tiles_of(size)
     launches = [first_launch(scene, size, max_depth, seed, planned_spp) for scene in compiled]
@@ -109,9 +109,9 @@ def make_team(devices: Sequence[Device], compiled: Sequence[CompiledScene], size
 
 def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
                  seed: int, planned_spp: int | None, before: Sequence[SceneOnDevice] = ()) -> LocalAccumulation:
-    """Return a Session if there is one device with room for the film, else a Crew; before: see `SceneOnDevice`."""
+    """Return that of a single device if it has room for the film, else that of a pool; before: see `SceneOnDevice`."""
     if len(devices) == 1:
         with suppress(NoRoomError):
             return SingleDeviceAccumulation(devices[0], compiled[0], size, max_depth, seed, planned_spp, before)
-    team = make_team(devices, compiled, size, max_depth, seed, planned_spp, before=before)
-    return MultiDeviceAccumulation(team, size)
+    pool = make_pool(devices, compiled, size, max_depth, seed, planned_spp, before=before)
+    return MultiDeviceAccumulation(pool, size)
