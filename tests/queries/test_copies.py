@@ -25,7 +25,7 @@ VERTICES, FACES = RNG.random((60, 3)), RNG.integers(0, 60, (120, 3))
 SPHERES = np.hstack([RNG.random((20, 3)), np.full((20, 1), 0.05)])
 RAYS = RNG.random((300, 3)), RNG.normal(size=(300, 3))
 PLACES = np.concatenate([np.tile(np.eye(3), (5, 1, 1)), RNG.normal(size=(5, 3, 1))], axis=2)
-SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
+SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 
 COPIES: dict[str, Callable[[Any], Any]] = {
     "pickle": lambda each: pickle.loads(pickle.dumps(each)), "copy": copy.copy, "deepcopy": copy.deepcopy}

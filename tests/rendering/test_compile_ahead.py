@@ -55,7 +55,7 @@ def test_what_is_refused_is_refused_as_without(device: Device) -> None:
     scene = clrt.Scene(meshes=[one], instances=[clrt.Instance(one, np.eye(3, 4) * (2 + i)) for i in range(40)])
     compiled = compile_scene(scene, Choices(device.lanes, builder="ploc"), device=device, ahead=True)
     assert compiled.tree.name == device.layout
-    with pytest.raises(UsageError, match="the builder ploc makes"):
+    with pytest.raises(UsageError, match="the builder ploc builds"):
         compile_scene(clrt.Scene(meshes=[one]), Choices(device.lanes, layout="list", builder="ploc"), device=device,
                       ahead=True)
 

@@ -86,7 +86,7 @@ def test_sums_do_not_depend_on_the_cut(device: Device) -> None:
 
 
 def test_waves_need_eight_lanes(device: Device) -> None:
-    with pytest.raises(UsageError, match="waves need 8 lanes, not 1"):
+    with pytest.raises(UsageError, match="waves needs 8 lanes, not 1"):
         Renderer(everything(), device=device.info.index, lanes=1, paths="waves")
     with pytest.raises(UsageError, match="paths 'rows' is unknown; choose from lanes, waves"):
         Renderer(everything(), device=device.info.index, paths="rows")
