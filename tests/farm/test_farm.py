@@ -153,7 +153,7 @@ def test_those_that_lie_are_left_out(processes: Processes, cluster: Cluster, sma
     for liar in liars:
         processes.kill(liar)
     assert same(expected, found)
-    assert "it has clrt 0.0.1 with the kernels" in caplog.text
+    assert "it runs clrt 0.0.1 with the kernels" in caplog.text
     assert f"this client clrt {clrt.__version__} with the kernels" in caplog.text
     assert "it returned pixels that are not finite" in caplog.text
 
