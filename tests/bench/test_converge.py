@@ -232,7 +232,7 @@ def test_command_does_what_is_asked(tmp_path: Path) -> None:
         assert written["calibration"][name]["pictures"] == 8 and not row["biased"]
         assert written["calibration"][name]["median"] == pytest.approx(median(sum(row["noise_ratio"], [])))
     assert median(rows["clrt, independent"]["noise_ratio"][1]) == pytest.approx(1, abs=0.15)
-    assert "3: " in done.output and "pictures  to 1.2x   median    worst" in done.output
+    assert "3: " in done.output and "images  to 1.2x   median    worst" in done.output
 
 
 def test_each_integrator_has_a_reference_of_its_own(tmp_path: Path) -> None:
@@ -263,7 +263,7 @@ def test_a_given_reference_is_used(tmp_path: Path) -> None:
     errors = [float(np.mean((picture - truth.astype(np.float64))**2 / (truth.astype(np.float64)**2 + 0.01)))
               for picture in pictures]
     assert row["relmse"] == [pytest.approx(np.mean(errors), rel=1e-5)]
-    for wrong, words in [(["--size", "8x8"], "is 24x16, the picture 8x8"), (["--reference-spp", "9"], "leave out")]:
+    for wrong, words in [(["--size", "8x8"], "is 24x16, the image 8x8"), (["--reference-spp", "9"], "leave out")]:
         failed = CliRunner().invoke(converge_command, [str(tmp_path / "ball.toml"), *asked, *wrong])
         assert isinstance(failed.exception, clrt.UsageError) and words in str(failed.exception)
 
