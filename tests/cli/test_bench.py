@@ -108,7 +108,7 @@ def test_a_violated_property_is_reported(monkeypatch: pytest.MonkeyPatch, tmp_pa
     options = ["--property", "brightness", "--scenes", "2", "--seed", "5", "--keep", str(tmp_path)]
     done = CliRunner().invoke(bench_combinations.combinations_command, options)
     assert done.exit_code == 1
-    assert "off: brightness, scene 0: 2 times the light: picture +2.00% ± 0.10%, a block +3.00%" in done.output
+    assert "off: brightness, scene 0: 2 times the light: image +2.00% ± 0.10%, one block +3.00%" in done.output
     assert re.search(r"^brightness +2 +1 ", done.output, re.M) and "scene 1" not in done.output
     assert [path.name for path in tmp_path.glob("*.toml")] == ["combination-5-0-brightness-as-it-is-0.toml"]
 
