@@ -103,14 +103,18 @@ static inline real3 escaped_light(const Scene *scene, const Path *path, ireal es
 // A shadow ray to a sampled point on a light, and its contribution if it is unoccluded.
 typedef struct {
     real3 origin, target, wi;
-    ireal infinite, light;
+    ireal infinite;
+#if OPACITY
+    ireal light;           // where it ends, see transmittance
+#endif
     real3 contribution;
 } ShadowRay;
 
 // 2. Next-event estimation: sample a light and the shadow ray to it. Returns the lanes that need a shadow ray.
 static inline ireal aim_at_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
                                  ireal active, Sampler *sampler, ShadowRay *ray) {
-    LightSample light = light_sample(scene, surface->p, choosing_normal(shading), sampler, &ray->light);
+    ireal number;
+    LightSample light = light_sample(scene, surface->p, choosing_normal(shading), sampler, &number);
     BsdfValue bsdf = shading_eval(shading, surface, light.wi);
     real3 contribution = mul(bsdf.value, light.radiance);
     ireal useful = active & !(light.pdf <= 0.0f) & carries_light(contribution);
@@ -119,6 +123,9 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     ray->target = light.target;
     ray->wi = light.wi;
     ray->infinite = light.infinite;
+#if OPACITY
+    ray->light = number;
+#endif
 #if ATTENUATION
     real3 absorption = absorption_along(shading, surface, light.wi, path->absorption);
     real distance = light.infinite ? (real)(INFINITY) : length3(sub(light.target, ray->origin));
@@ -131,7 +138,12 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
 
 // Trace the shadow rays of the lanes `sent`; return their contributions.
 static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal sent) {
-    real visible = transmittance(scene, ray->origin, ray->light, ray->target, ray->wi, ray->infinite, sent);
+#if OPACITY
+    ireal light = ray->light;
+#else
+    ireal light = (ireal)(-1);
+#endif
+    real visible = transmittance(scene, ray->origin, light, ray->target, ray->wi, ray->infinite, sent);
     return choose(visible > 0.0f, scale(ray->contribution, visible), splat(ZERO));
 }
 #endif
