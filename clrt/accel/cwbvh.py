@@ -77,7 +77,7 @@ def compress(tree: Bvh) -> CompressedBvh:
 def octant_slots(offset: NDArray[np.float64], used: BoolArray) -> IntArray:
     """Assign the children to slots, (k, 8), −1 for none, so that rays of any direction visit near children first.
 
-    offset: (k, 8, 3), child's centre − node's centre; used: (k, 8), which children exist. A ray whose direction is
+    offset: (k, 8, 3), child's center − node's center; used: (k, 8), which children exist. A ray whose direction is
     negative on the axes of the bits of i visits the slots in the order of slot ^ i, so slot i should hold the child
     farthest towards its corner. Greedily, the pair of remaining child and slot with the largest offset · corner is
     assigned, the lowest child and slot on ties. (The optimal assignment costs more and made no measured ray faster.)

@@ -105,7 +105,7 @@ def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) 
     """Build a BVH and pack it.
 
     layout: a name in LAYOUTS; builder: a name in BUILDERS (unused by list and packs). triangles: (m, 3, 3) float32
-    corners; spheres: (s, 4) float32 centre and radius; all finite. Raises UsageError for an unknown name, and
+    corners; spheres: (s, 4) float32 center and radius; all finite. Raises UsageError for an unknown name, and
     SceneError for more primitives than the layout supports.
     """
     check_choice("layout", layout, LAYOUTS)

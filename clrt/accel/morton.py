@@ -22,7 +22,7 @@ SHAPE = 9
 class Primitives:
     """Triangles and spheres on the device in Morton order.
 
-    shapes: (count, 9) float32, corners, or centre and radius. ids: (count,) uint32, their numbers in the scene, where
+    shapes: (count, 9) float32, corners, or center and radius. ids: (count,) uint32, their numbers in the scene, where
     triangles come first.
     """
 

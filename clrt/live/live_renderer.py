@@ -108,7 +108,7 @@ class LiveRenderer:
         return pixels
 
     def seen_at(self, x: float, y: float) -> Thing | None:
-        """Return the first hit at a position (see `PickRequests`), at a pixel's centre."""
+        """Return the first hit at a position (see `PickRequests`), at a pixel's center."""
         renderer = self.renderer
         if renderer is None:
             return None

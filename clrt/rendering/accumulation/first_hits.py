@@ -16,7 +16,7 @@ from ..compile.compile_scene import CompiledScene
 from .accumulation import Accumulation
 from .per_pixel_kernel import render_pixels
 
-#: AOVs averaged over each pixel's rays, and AOVs of the ray through its centre.
+#: AOVs averaged over each pixel's rays, and AOVs of the ray through its center.
 MEANS = ("albedo", "normal", "geometric_normal")
 OF_THE_MIDDLE = ("position", "depth", "primitive", "object", "material")
 #: Camera rays per pixel.

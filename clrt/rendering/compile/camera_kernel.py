@@ -17,7 +17,7 @@ CAMERA_FIELDS = ("position", "right", "up", "forward", "lens_radius")
 
 
 def camera_file(camera: Camera, integrator: str) -> str:
-    """Return the kernel file that generates its rays. Integrator `depth` uses the ray through the lens centre."""
+    """Return the kernel file that generates its rays. Integrator `depth` uses the ray through the lens center."""
     return "camera/thin_lens.cl" if camera.aperture_radius and integrator != "depth" else FILES[camera.projection]
 
 

@@ -42,7 +42,7 @@ FILTERS: dict[str, tuple[float, Callable[[Doubles], Doubles]]] = {
 
 
 def filter_quantiles(name: str) -> NDArray[np.void]:
-    """Return (CELLS + 1,) FILTER records of a filter in FILTERS: positions from a pixel's edge, its centre at 0.5."""
+    """Return (CELLS + 1,) FILTER records of a filter in FILTERS: positions from a pixel's edge, its center at 0.5."""
     radius, distribution = FILTERS[name]
     wanted = np.arange(CELLS + 1) / CELLS
     low, high = np.full(CELLS + 1, -1.0), np.full(CELLS + 1, 1.0)

@@ -65,7 +65,7 @@ GUIDE = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
 DIRECT = record(direct="3f4", pad0="u4", direct_error="3f4", pad1="u4")
 PIXEL_WITH_DIRECT = np.dtype([*PIXEL.descr, *DIRECT.descr])
 #: A projected primitive (kernels/raster/outline.cl). edge0 … nearness: functions of the image position, or for a sphere
-#: its centre and radius; instance: negative for spheres; rows: range of pixel rows that it may cover.
+#: its center and radius; instance: negative for spheres; rows: range of pixel rows that it may cover.
 OUTLINE = record(edge0="3f4", primitive="i4", edge1="3f4", instance="i4", edge2="3f4", first_row="i4", nearness="3f4",
                  last_row="i4")
 #: An entry of the layer energy tables (clrt/scene/materials/layer_energy.py).

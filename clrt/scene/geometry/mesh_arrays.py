@@ -46,7 +46,7 @@ def sphere_array(spheres: ArrayLike) -> Floats:
     with np.errstate(over="ignore"):
         table = given.astype(np.float32)
     if table.ndim != 2 or table.shape[1] != 4:
-        raise SceneError(f"spheres {table.shape} must have the shape (s, 4), centre and radius")
+        raise SceneError(f"spheres {table.shape} must have the shape (s, 4), center and radius")
     good = np.isfinite(table).all(axis=1) & (table[:, 3] > 0)
     if not good.all():
         row = int(np.argmin(good))

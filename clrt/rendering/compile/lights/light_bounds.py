@@ -23,7 +23,7 @@ SMALLER = 2.0**-20
 class LightGroups:
     """Bounds of n groups of one or more lights each, as used by kernels/light/importance.cl.
 
-    low, high: (n, 3), bounding boxes. radius: (n,), of a bounding sphere around the box's centre. axis: (n, 3), unit,
+    low, high: (n, 3), bounding boxes. radius: (n,), of a bounding sphere around the box's center. axis: (n, 3), unit,
     or 0. cos_cone: (n,), the cosine of the angle around the axis that contains all their normals, −1 if these point in
     all directions. intensity: (n,), total of luminance of radiance times area, or of W/sr. cos_reach: (n,), the cosine
     of the maximum emission angle from the nearest normal, 0 for surfaces.

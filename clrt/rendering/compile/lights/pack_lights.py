@@ -154,7 +154,7 @@ def _towards(light: DirectionalLight) -> Doubles:
 def _irradiance_of_suns(records: NDArray[Any]) -> Doubles:
     """Return (n, 4) like `_irradiance`: an upper bound that is 0 only where the whole disc is below the horizon.
 
-    The highest point of a disc has elevation h + a, where h is the elevation of its centre and a half its angle, and
+    The highest point of a disc has elevation h + a, where h is the elevation of its center and a half its angle, and
     sin(h + a) <= sin h + sin a.
     """
     height = _doubles(records, "height")
