@@ -8,8 +8,8 @@ from types import FrameType
 from typing import Any
 
 
-class Interrupted(Exception):
-    """Exception that stands for one raised by a signal handler."""
+class Interrupted(BaseException):
+    """Exception that stands for a KeyboardInterrupt, which `except Exception` does not catch."""
 
 
 def run(call: Callable[[], object], files: tuple[str, ...], last: int = -1) -> int:

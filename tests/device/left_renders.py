@@ -20,8 +20,8 @@ RNG = np.random.default_rng(3)
 ROUNDS, RAYS = 8, 60_000
 
 
-class Left(Exception):
-    """Exception raised by the signal handler."""
+class Left(BaseException):
+    """Exception raised by the signal handler, a BaseException as KeyboardInterrupt is: libraries leave it alone."""
 
 
 def scene() -> clrt.Scene:
