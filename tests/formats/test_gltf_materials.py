@@ -122,6 +122,21 @@ def test_layers_and_glass(tmp_path: Path) -> None:
         color=(1, 0.5, 1), ior=1.4, roughness=0.5, attenuation_color=(0.5, 1, 1), attenuation_distance=2)
 
 
+@pytest.mark.parametrize("ior", [0, 1, 1.5, 4, 5, 25])
+def test_reflectance_follows_the_ior(ior: float, tmp_path: Path) -> None:
+    """KHR_materials_ior: ((ior - 1)/(ior + 1))² times the specular color; 0 stands for infinity."""
+    tint = np.array([1, 0.5, 0.01])
+    extensions = {"KHR_materials_ior": {"ior": ior}, "KHR_materials_specular": {"specularColorFactor": tint.tolist()}}
+    gltf = ball()
+    gltf.document["materials"] = [{"extensions": extensions, "pbrMetallicRoughness": {"metallicFactor": 0}}]
+    gltf.document["meshes"][0]["primitives"][0]["material"] = 0
+    made = read(gltf, tmp_path).meshes[0].material
+    assert isinstance(made, MetallicRoughness)
+    reflectance = np.array(made.parameters()["f0"]) * np.array(made.specular_color)
+    expected = 1.0 if ior == 0 else ((ior - 1) / (ior + 1))**2
+    assert reflectance == pytest.approx(expected * tint, rel=1e-6)
+
+
 GLASS: dict[str, Any] = {"KHR_materials_transmission": {"transmissionFactor": 1},
                          "KHR_materials_volume": {"thicknessFactor": 1}}
 LAYERS: dict[str, Any] = {"KHR_materials_clearcoat": {"clearcoatFactor": 1},

@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 NEAREST = 9728
-#: Upper limit of the ior; glTF's 0 stands for infinity.
+#: Upper limit of a material's ior.
 MOST_IOR = 4.0
 #: With an opacity of 1 the alpha of vertex colors would be ignored.
 BELOW_ONE = 1 - 2.0**-24
@@ -77,6 +77,8 @@ class Materials:
         """Return the fields for the extensions in use."""
         coat, sheen = extensions.KHR_materials_clearcoat, extensions.KHR_materials_sheen
         specular, transmission = extensions.KHR_materials_specular, extensions.KHR_materials_transmission
+        ior, beyond = _ior(extensions.KHR_materials_ior.ior)
+        red, green, blue = (beyond * value for value in _positive(specular.specularColorFactor))
 
         def number(factor: float, info: looks.TextureInfo | None, channel: Channel) -> float | Texture:
             return _numbered(_unit(factor), self._texture(info, primitive, user) if factor > 0 else None, channel)
@@ -85,7 +87,7 @@ class Materials:
             return _colored(factor, self._texture(info, primitive, user) if max(factor) > 0 else None, info, 1.0)
 
         return {
-            "ior": float(np.clip(extensions.KHR_materials_ior.ior or MOST_IOR, 1, MOST_IOR)),
+            "ior": ior,
             "clearcoat": number(coat.clearcoatFactor, coat.clearcoatTexture, "red"),
             "clearcoat_roughness": number(coat.clearcoatRoughnessFactor, coat.clearcoatRoughnessTexture, "green"),
             "clearcoat_normal_map": self._bend(coat.clearcoatNormalTexture if coat.clearcoatFactor > 0 else None,
@@ -93,7 +95,7 @@ class Materials:
             "sheen_color": color(_cut(sheen.sheenColorFactor), sheen.sheenColorTexture),
             "sheen_roughness": number(sheen.sheenRoughnessFactor, sheen.sheenRoughnessTexture, "alpha"),
             "specular": number(specular.specularFactor, specular.specularTexture, "alpha"),
-            "specular_color": color(_positive(specular.specularColorFactor), specular.specularColorTexture),
+            "specular_color": color((red, green, blue), specular.specularColorTexture),
             "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red")}
 
     def _bend(self, info: looks.NormalTextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
@@ -169,6 +171,19 @@ def _colored(factor: tuple[float, float, float], texture: Texture | None, info: 
 
 def _numbered(factor: float, texture: Texture | None, channel: Channel) -> float | Texture:
     return factor if texture is None else replace(texture, factor=factor, channel=channel)
+
+
+def _ior(ior: float) -> tuple[float, float]:
+    """Return the ior within the limits of a material, and by how much its reflectance is too small then. glTF's 0 means
+    infinity."""
+    if 0 < ior <= MOST_IOR:
+        return max(ior, 1.0), 1.0
+    return MOST_IOR, _reflectance(ior) / _reflectance(MOST_IOR)
+
+
+def _reflectance(ior: float) -> float:
+    """Return the reflectance at normal incidence; 1 for glTF's 0."""
+    return ((ior - 1) / (ior + 1))**2
 
 
 def _positive(color: tuple[float, float, float]) -> tuple[float, float, float]:
