@@ -47,7 +47,7 @@ DIRECT = re.compile(r"scene->(?!counts\b)(\w+)\s*(?:\[|->|\+)")
 
 
 def test_arrays_of_the_scene_may_be_in_parts() -> None:
-    """Scene arrays may be split, so records must be accessed by RECORD or GATHER only (arrays.cl)."""
+    """Scene arrays may be split, so records must be accessed by RECORD or GATHER only (core/arrays.cl)."""
     assert not [(file, array) for file, text in TEXTS.items() for array in DIRECT.findall(re.sub(r"//.*", "", text))]
 
 

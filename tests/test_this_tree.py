@@ -39,11 +39,11 @@ def test_a_run_in_another_tree_ends_before_its_first_test(tmp_path: Path) -> Non
     for folder in ("clrt", "kernels", "tests"):
         shutil.copytree(HOUSE / folder, tmp_path / "tree" / folder)
     shutil.copy(HOUSE / "setup.cfg", tmp_path / "tree")
-    with open(tmp_path / "tree" / "kernels" / "lanes.cl", "a", encoding="utf-8") as kernel:
+    with open(tmp_path / "tree" / "kernels" / "core/lanes.cl", "a", encoding="utf-8") as kernel:
         kernel.write("// another\n")
     done = subprocess.run([sys.executable, "-m", "pytest", "-q", "tests/bench/test_significance.py"],
                           cwd=tmp_path / "tree", capture_output=True, text=True,
                           env=os.environ | {"PYTHONSAFEPATH": "1"})
     assert done.returncode == pytest.ExitCode.USAGE_ERROR
-    assert "clrt.kernels: lanes.cl" in done.stderr and "pip install" in done.stderr
+    assert "clrt.kernels: core/lanes.cl" in done.stderr and "pip install" in done.stderr
     assert "passed" not in done.stdout

@@ -1,4 +1,4 @@
-"""Check masks of eight lanes: their bits, and the operations for BVHs with eight children (kernels/mask.cl)."""
+"""Check masks of eight lanes: their bits, and the operations for BVHs with eight children (kernels/core/mask.cl)."""
 
 from __future__ import annotations
 

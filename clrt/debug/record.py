@@ -1,4 +1,4 @@
-"""Record of a path vertex, and the reasons why paths end (kernels/debug.cl)."""
+"""Record of a path vertex, and the reasons why paths end (kernels/integrator/debug.cl)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ class PathEnd(IntEnum):
 
 
 def vertex_preamble() -> str:
-    """Return the definitions that kernels/debug.cl needs: the record, its members by kind, and the numbers of End."""
+    """Return the definitions that kernels/integrator/debug.cl needs: the record, its members by kind, and the numbers
+    of End."""
     lists = {"ROWS": np.dtype("3f4"), "REALS": np.dtype("f4"), "INTS": np.dtype("i4")}
     members = {kind: [name for name in VERTEX.names or () if VERTEX[name] == of] for kind, of in lists.items()}
     return "\n".join([

@@ -17,7 +17,7 @@ from ..rendering.accumulation.checked_loops import check_paths
 from ..rendering.accumulation.launch_plan import depth_of, first_launch, first_launch_samples
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
 from ..rendering.compile.choices import Choices, choices_on
-from ..rendering.compile.compile_scene import CompiledScene, compile_scene
+from ..rendering.compile.compile_scene import DEBUG, CompiledScene, compile_scene
 from ..rendering.compile.features import WITH_LIGHT
 from ..rendering.error_estimate.adaptive_sampling import most_planned
 from ..scene.model import RenderSettings, Scene
@@ -25,7 +25,7 @@ from .record import VERTEX, PathEnd, vertex_preamble
 
 #: Maximum records per launch, unless a single sample needs more.
 MOST_RECORDS = 1 << 15
-#: Samples with a component brighter than this, or not finite, are dropped (kernels/film.cl).
+#: Samples with a component brighter than this, or not finite, are dropped (kernels/film/film.cl).
 BRIGHTEST = np.float32(1e31)
 
 
@@ -77,7 +77,7 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
     """
     settings = scene.render
     _check(settings, pixel)
-    compiled = compile_scene(scene, choices_on(device, choices, lanes), "debug.cl", device)
+    compiled = compile_scene(scene, choices_on(device, choices, lanes), DEBUG, device)
     compiled = replace(compiled, preamble=f"{compiled.preamble}\n{vertex_preamble()}")
     depth = depth_of(settings)
     planned = most_planned(settings.spp, settings.adaptive)

@@ -61,7 +61,7 @@ class Device:
 
     @property
     def packs(self) -> bool:
-        """Return whether one instruction compacts lanes (kernels/mask.cl), which wavefront path tracing needs."""
+        """Return whether one instruction compacts lanes (kernels/core/mask.cl), which wavefront path tracing needs."""
         return self.vectors and self.is_pocl and platform.machine().lower() in ("x86_64", "amd64")
 
     @property

@@ -161,7 +161,7 @@ class TreeQuery:
         return answers
 
     def _check_loops(self, answers: NDArray[Any]) -> None:
-        """Raise DeviceError if the driver ended loops before they had a result (kernels/query.cl)."""
+        """Raise DeviceError if the driver ended loops before they had a result (kernels/query/query.cl)."""
         turns = loop_turns(self.device)
         if turns is None:
             return
@@ -235,7 +235,7 @@ class TreeQuery:
         preamble = "\n".join([defines(values), typedefs({"Counts": COUNTS, "RayHit": self._hit}),
                               scene_struct(tree_buffers(self.tree))])
         files = tree_files(self.tree.name, self._tests, triangles, spheres, instances=instances)
-        return compose(preamble, "query_pool.cl" if traversal == "pool" else "query.cl",
+        return compose(preamble, "query/query_pool.cl" if traversal == "pool" else "query/query.cl",
                        files | {"PACKETS": ["traverse/packet.cl"] if traversal == "packet" else []})
 
 

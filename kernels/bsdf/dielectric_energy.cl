@@ -1,5 +1,5 @@
-// Multiple-scattering compensation of rough glass (clrt/scene/materials/dielectric_energy.py); the energy that a single bounce
-// loses is returned by:
+// Multiple-scattering compensation of rough glass (clrt/scene/materials/dielectric_energy.py); the energy that a
+// single bounce loses is returned by:
 //   f·|cos wi| over 1 − min(loss(wo), loss(wi)), and rest(wo)·rest(wi)·|cos wi|/(pi·m)·share
 // with m = Σ n²·∫ rest·2c dc over n² of wo's side, and share = n² of wi's side over that of wo's; for a thin sheet, the
 // mean rest and the part that leaves on wi's side. Both are reciprocal, and at every angle all light is reflected or

@@ -1,5 +1,5 @@
 // Lambertian reflection: f = color/pi over the upper hemisphere. Source: Suchiński 6.2.
-#include "sampling.cl"
+#include "core/sampling.cl"
 #include "bsdf/interface.cl"
 
 struct diffuse { real3 color; };

@@ -1,6 +1,6 @@
 // The GGX distribution of microfacet normals h (Walter et al. 2007, eq. 33), Smith masking, and sampling of visible
 // normals (Dupuy and Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps"). Local frame.
-#include "sampling.cl"
+#include "core/sampling.cl"
 
 #define ALPHA_MIN 1e-4f   // below it D(h) exceeds the range of float32
 

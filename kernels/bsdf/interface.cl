@@ -13,7 +13,7 @@
 // TRANSMISSION; also TRANSMISSION_LOBES if eval supports directions beyond the surface, with NAME_transmits(m): whether
 // it can be nonzero there; and ATTENUATION if light is absorbed there, with NAME_absorption(m, here): the coefficient
 // per unit of length, given `here` on the side of wo. A material without ATTENUATION has no inside either.
-#include "surface.cl"
+#include "surface/surface.cl"
 
 // For each parameter the preamble defines whether any material of its type reads it from a texture: READ_kind_name is
 // CONSTANT or TEXTURED.
@@ -34,7 +34,7 @@
 // Value and pdf of one direction wi, evaluated together because they share most of their terms.
 typedef struct {
     real3 value;        // f·|cos wi|, `spread` included
-    real3 matte;        // the diffuse part of it, close to Lambert's law (horizon.cl)
+    real3 matte;        // the diffuse part of it, close to Lambert's law (surface/horizon.cl)
     real pdf;           // pdf per solid angle
 } BsdfValue;
 

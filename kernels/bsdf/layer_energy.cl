@@ -1,6 +1,6 @@
 // The energy that min(T(wo), T(wi)) removes from gloss and fibres (layers.cl), from the table of
-// clrt/scene/materials/layer_energy.py: for each roughness of the base, the coat and the fibres, three entries of means and
-// LAYER_STEPS + 1 entries by angle, uniform in √cos.
+// clrt/scene/materials/layer_energy.py: for each roughness of the base, the coat and the fibres, three entries of
+// means and LAYER_STEPS + 1 entries by angle, uniform in √cos.
 #define LAYER_STEPS 96
 #define LAYER_PARTS 8
 #define LAYER_ENTRIES (LAYER_STEPS + 4)

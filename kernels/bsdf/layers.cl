@@ -6,7 +6,7 @@
 //
 // COAT_NORMALS: wo and wi are in the frame of the unbent normal. The coat and the base each reflect in a frame around
 // their own normal, and nothing below its horizon. Gloss scattered below the horizon of the unbent normal is mirrored
-// at it, as at the geometric surface (horizon.cl).
+// at it, as at the geometric surface (surface/horizon.cl).
 //
 // A coat transmits T(c) = 1 − clearcoat·E(c) of light from an angle, with the albedo E of its single bounce
 // (ggx_albedo.cl); the energy that bounce loses goes to the base. Fibres transmit 1 − max(sheen_color)·E, with their

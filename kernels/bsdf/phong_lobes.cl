@@ -4,7 +4,7 @@
 // local integrator (LOCAL) uses both in their original form, with the irradiance over pi as the colour of a light:
 //   color·(n·l) + specular·(…)^shininess
 #include "bsdf/interface.cl"
-#include "sampling.cl"
+#include "core/sampling.cl"
 
 // x^n for x in [0, 1]; 1 for n = 0.
 static inline real power(real x, real n) { return exp(n * log(maximum(x, (real)(1e-30f)))); }

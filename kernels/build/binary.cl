@@ -1,7 +1,7 @@
 // The binary BVH from clustering, before it is collapsed to the wide BVH: a BinaryNode has the box around its two
 // children.
 #include "build/primitives.cl"
-#include "mask.cl"
+#include "core/mask.cl"
 
 // A child is a node index, or ~p for primitive p.
 static inline Box node_box(const Primitives *primitives, global const BinaryNode *nodes, int node) {

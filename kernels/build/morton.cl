@@ -1,7 +1,7 @@
 // Sort primitives along a space-filling curve by the Morton codes of their boxes' centres, 21 bits per axis.
 #include "build/primitives.cl"
 #include "build/sort.cl"
-#include "mask.cl"
+#include "core/mask.cl"
 
 #define SHAPES_AHEAD 16   // prefetch distance, in primitives
 

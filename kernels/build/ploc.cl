@@ -7,7 +7,7 @@
 // p. RADIUS columns at infinite distance pad both ends. A round that merges fewer than one cluster in SLOW is followed
 // by one that merges all neighbours, so that depth and time are bounded for any input, nested boxes included.
 #include "build/primitives.cl"
-#include "mask.cl"
+#include "core/mask.cl"
 
 #define RADIUS 8
 #define FAR 4e18f

@@ -1,7 +1,7 @@
 // Equirectangular (360°) camera: longitude to the right, latitude up, forward in the centre. Looking along +Z with +Y
 // up, a direction has the same position as in an environment map (light/image_sky.cl). right, up, forward: unit. World
 // frame.
-#include "sampling.cl"
+#include "core/sampling.cl"
 
 #define ALL_AROUND 1    // nothing is behind the camera
 

@@ -1,5 +1,5 @@
 // Orthographic camera: parallel rays along forward, unit; right, up: half the image's width and height. World frame.
-#include "vector.cl"
+#include "core/vector.cl"
 
 static inline CameraRay ray_through(const Launch *launch, real sx, real sy, Sampler *sampler) {
     real3 right = broadcast(launch->right), up = broadcast(launch->up);

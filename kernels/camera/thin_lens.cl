@@ -4,7 +4,7 @@
 // lens_radius·|s − d|/d.
 //
 // right, up, forward: the pinhole's times s, so that they reach the plane of focus. World frame.
-#include "sampling.cl"
+#include "core/sampling.cl"
 
 static inline CameraRay ray_through(const Launch *launch, real sx, real sy, Sampler *sampler) {
     real3 right = broadcast(launch->right), up = broadcast(launch->up), forward = broadcast(launch->forward);

@@ -2,7 +2,7 @@
 //
 // The host numbers the rows (ROW_…): row r of vector i is out[r·count + i]; floats as their bits, masks as they are.
 #include "check/rows.cl"
-#include "vector.cl"
+#include "core/vector.cl"
 
 #define REAL(row, value) out[ROW_##row * count + i] = AS_INT(value);
 #define MASK(row, value) out[ROW_##row * count + i] = value;

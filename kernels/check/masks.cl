@@ -1,5 +1,5 @@
-// The masks of eight lanes used in BVH traversal (mask.cl). Each i has three rows of eight: the lanes' masks of a < b;
-// the set lanes of a, compressed, then −1; the mask's bits, their number and the first of them, the lane with the
+// The masks of eight lanes used in BVH traversal (core/mask.cl). Each i has three rows of eight: the lanes' masks of a
+// < b; the set lanes of a, compressed, then −1; the mask's bits, their number and the first of them, the lane with the
 // smallest b among them, and the bits of sixteen lanes, of which the upper eight are the complement.
 #include "check/rows.cl"
 

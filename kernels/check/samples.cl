@@ -1,7 +1,7 @@
 // Random numbers and sums of samples, for the host to compare with exact results.
 #include "check/rows.cl"
-#include "film.cl"
-#include "sampler.cl"
+#include "film/film.cl"
+#include "sampler/interface.cl"
 
 // in: pixel, sample. out: the bits of two dimensions, then the numbers made from them
 kernel void numbers(uint count, uint block, global const ureal *in, uint seed, uint dimension, global ureal *bits,

@@ -5,7 +5,7 @@
 // NaN, which every comparison here drops: such a ray counts as inside the slab. Flat boxes are hit since near == far
 // counts as a hit.
 #include "geometry/wide.cl"
-#include "vector.cl"
+#include "core/vector.cl"
 #include BOX_TEST
 
 // Boxes that end before this t are skipped: with NEXT_HIT, the t of the last hit.

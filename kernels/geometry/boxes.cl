@@ -5,7 +5,7 @@
 // component below 1/STEEPEST is replaced by that value, and SIDE pads its planes. Overflow gives NaN, which the
 // comparisons drop: such a ray counts as inside the slab. Flat boxes are hit since near == far counts as a hit.
 // Directions have a length near 1.
-#include "vector.cl"
+#include "core/vector.cl"
 #include BOX_TEST
 
 typedef struct {

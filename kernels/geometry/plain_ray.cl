@@ -1,6 +1,6 @@
 // Shared parts of the triangle tests that use the ray untransformed and compute t, u, v.
 #include "geometry/wide.cl"
-#include "vector.cl"
+#include "core/vector.cl"
 
 typedef Ray TriangleRay;
 

@@ -9,7 +9,7 @@
 // may_meet rejects most missed spheres early, in single precision: each of its three terms has an error of at most 8 u
 // of |f|²·a, and its margin is 64 u of that.
 #include "geometry/twice.cl"
-#include "vector.cl"
+#include "core/vector.cl"
 
 #define SPHERE_OF(type, mask, Twice, name) \
     TWICE_OF(type, Twice, name) \

@@ -1,6 +1,6 @@
 // Ray–sphere intersection by the textbook quadratic formula (Nadolny 1.8): a·t² + b·t + c = 0, both roots. It suffers
 // from cancellation of b² and 4ac, or of −b and the root: small or distant spheres, and huge ones nearby.
-#include "vector.cl"
+#include "core/vector.cl"
 
 #define SPHERE_OF(type, mask, Twice, name) \
     static inline mask name##_may_meet(const type f[3], const type d[3], float radius) { \

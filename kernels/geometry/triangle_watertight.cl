@@ -13,7 +13,7 @@
 // next to a surface and leave it never hit it, and none passes through a sliver.
 #include "geometry/wide.cl"
 #include "geometry/twice.cl"
-#include "vector.cl"
+#include "core/vector.cl"
 
 TWICE_OF(wide, TwiceWide, wide)
 

@@ -1,7 +1,7 @@
 // Triangles are stored in packs of PACK_SIZE: 1 in BVHs of single triangles, 8 if a leaf is a pack, 16 without a BVH.
 // They are tested WIDTH at a time: all of a pack, or sixteen in halves if no register holds them. `wide` holds one
 // float of each; LOAD_WIDE reads a row of a record, whatever the width.
-#include "mask.cl"
+#include "core/mask.cl"
 
 #ifndef WIDTH
 #if PACK_SIZE == 16 && !defined(__AVX512F__)

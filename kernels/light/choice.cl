@@ -5,7 +5,7 @@
 // sampling alone, so a probability of 0 anywhere else would silently lose their light.
 //
 // The choice is among the first CHOICES groups, the last INFINITE_LIGHTS of which are infinite lights.
-#include "sampler.cl"
+#include "sampler/interface.cl"
 #include "light/importance.cl"
 #include LIGHT_TREE_FILE
 

@@ -6,7 +6,7 @@
 // their maximum: 0 only if the group contributes nothing (after Conty Estevez and Kulla 2018, "Importance Sampling of
 // Many Lights with Adaptive Tree Splitting", eq. 3). World frame. n: unit, on the lit side of the surface, or 0 if
 // light from either side counts.
-#include "vector.cl"
+#include "core/vector.cl"
 
 #define LEAST_IMPORTANCE 1e-30f   // if a group can contribute: less could underflow in sums and quotients
 

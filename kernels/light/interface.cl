@@ -10,8 +10,8 @@
 //
 // World frame; wi: unit, from p to the light; u in [0,1)², on which directions depend continuously as far as possible.
 // Lights draw no random numbers themselves: a lane's numbers must not depend on the choices of its neighbours.
-#include "surface.cl"
-#include "sampling.cl"
+#include "surface/surface.cl"
+#include "core/sampling.cl"
 
 typedef struct {
     real3 wi;

@@ -1,5 +1,5 @@
 // Trivial light selection for a single light (see light/choice.cl).
-#include "sampler.cl"
+#include "sampler/interface.cl"
 
 static inline ireal pick_light(const Scene *scene, real3 p, real3 n, Sampler *sampler, real *u, real *probability) {
     *probability = ONE;

@@ -6,8 +6,8 @@
 #include OPACITY_FILE
 
 // 1 − cos of the cone's half angle, without cancellation for a distant sphere. It is 0 from inside, where the sphere
-// does not emit, and for points on the sphere itself, within their rounding error (surface.cl), which see only its
-// inside.
+// does not emit, and for points on the sphere itself, within their rounding error (surface/surface.cl), which see only
+// its inside.
 static inline real sphere_light_cone(real3 center, real radius, real3 to_center) {
     real sin2 = radius * radius / dot3(to_center, to_center);
     real reach = radius + (real)(GAMMA(32)) * (largest(absolute3(center)) + radius);

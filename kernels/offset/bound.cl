@@ -1,6 +1,6 @@
 // Origins of spawned rays: at the edge of the position's error bound, without an epsilon of scene size (pbrt, 4th ed.,
 // 6.8).
-#include "vector.cl"
+#include "core/vector.cl"
 
 // If the error bound of a position is 0, as on a floor at y = 0, it is moved by this fraction of its largest
 // coordinate: as much as the rounding of the triangle test, which is exact where that is not enough

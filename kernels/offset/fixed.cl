@@ -1,6 +1,6 @@
 // Origins of spawned rays: a fixed offset of a thousandth of a unit of length, as in textbooks. Too small if
 // coordinates are large, too large if the scene is small. SCENE_UNIT is the scene's unit of length.
-#include "vector.cl"
+#include "core/vector.cl"
 
 #define EPSILON (1e-3f * SCENE_UNIT)
 

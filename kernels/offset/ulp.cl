@@ -4,7 +4,7 @@
 //
 // An ulp grows with the coordinate in steps, as its rounding does; the primitive's size, on which the error depends, is
 // ignored. SCENE_UNIT is the scene's unit of length.
-#include "vector.cl"
+#include "core/vector.cl"
 
 #define ULPS 256.0f
 #define NEAR_ZERO (SCENE_UNIT / 32.0f)

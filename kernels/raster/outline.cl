@@ -1,15 +1,15 @@
 // Binning: compute the outline of each primitive that a camera sees, and the bins that it overlaps.
 //
-// Points are relative to the eye. The image position (sx, sy), as in camera.cl, is in the direction sx·right − sy·up +
-// forward. The plane through the eye and two corners a, b cuts the image in a line, on whose two sides the edge
-// function (a × b)·direction, a function e0·sx + e1·sy + e2, has opposite signs; and with a triangle's normal N, 1 over
-// the distance at which that direction hits its plane is N·direction/N·corner, another such function. That holds
-// wherever the corners are, so no clipping is needed: anything behind the eye is on the wrong side of some edge (Olano
-// and Greer 1997, "Triangle Scan Conversion using 2D Homogeneous Coordinates").
+// Points are relative to the eye. The image position (sx, sy), as in integrator/camera_rays.cl, is in the direction
+// sx·right − sy·up + forward. The plane through the eye and two corners a, b cuts the image in a line, on whose two
+// sides the edge function (a × b)·direction, a function e0·sx + e1·sy + e2, has opposite signs; and with a triangle's
+// normal N, 1 over the distance at which that direction hits its plane is N·direction/N·corner, another such function.
+// That holds wherever the corners are, so no clipping is needed: anything behind the eye is on the wrong side of some
+// edge (Olano and Greer 1997, "Triangle Scan Conversion using 2D Homogeneous Coordinates").
 //
 // Both triangles at an edge use its corners in the same order and multiply by explicit fma: they compute the same
 // function up to its sign, so no image position falls between them.
-#include "vector.cl"
+#include "core/vector.cl"
 #include "raster/bins.cl"
 
 #define SLACK 0.0625f   // of bounds, in pixels: far more than the rounding of edges

@@ -2,8 +2,8 @@
 // equally near ones the first, whatever the order of entries.
 //
 // A work-item takes ROWS times LANES pixels: on a CPU a whole tile, so that each outline is read once per tile.
-#include "camera.cl"
-#include "surface.cl"
+#include "integrator/camera_rays.cl"
+#include "surface/surface.cl"
 #include "raster/bins.cl"
 #include SPHERE_TEST
 

@@ -1,5 +1,5 @@
 // Independent samples: the error falls as 1/√n. The simplest sampler, for comparison.
-#include "rng.cl"
+#include "core/rng.cl"
 
 typedef struct {
     ureal pixel, sample;

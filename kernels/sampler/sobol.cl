@@ -6,9 +6,10 @@
 // The pixels of a square take blocks of 2^block_bits points of one sequence along the Z curve, so that neighbouring
 // pixels are stratified together and their errors cancel when the eye or a filter averages them (Ahmed and Wonka 2020).
 // Each square, and each later block, has its own sequence: the errors of pixels that share a sequence are correlated,
-// and if all pixels did, changes of the image would not reveal its error (clrt/rendering/error_estimate/error_estimate.py). With block_bits =
-// 32, for an unknown number of samples, each pixel has its own sequence.
-#include "rng.cl"
+// and if all pixels did, changes of the image would not reveal its error
+// (clrt/rendering/error_estimate/error_estimate.py). With block_bits = 32, for an unknown number of samples, each
+// pixel has its own sequence.
+#include "core/rng.cl"
 
 #define SQUARE_BITS 8   // of a pixel's index in its square, unless the points of that many pixels exceed 32 bits
 

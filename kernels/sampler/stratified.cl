@@ -1,7 +1,7 @@
 // Stratified (jittered) samples: the pairs of a block of 2^k samples fall one into each cell of a grid of 2^k cells, in
 // a random order per pixel and pair of dimensions (Cook et al. 1984; Kensler 2013, "Correlated Multi-Jittered
 // Sampling", for the order).
-#include "rng.cl"
+#include "core/rng.cl"
 
 #define MOST_CELLS_BITS 16   // of a grid
 #define DEFAULT_CELLS_BITS 8 // if the number of samples is unknown

@@ -1,6 +1,6 @@
 // Spheres of a scene that has few: the rays of all lanes are tested against each sphere before each traverses the BVH
 // alone. A test costs less per ray than a BVH node.
-#include "vector.cl"
+#include "core/vector.cl"
 #include SPHERE_TEST
 
 SPHERE_OF(real, ireal, TwiceReal, lone)

@@ -1,7 +1,7 @@
 // Ray tracing of all lanes: closest_hit and any_hit, with the BVH layout that the host chose.
 //
 // A scene without primitives has no BVH: every ray escapes, and none of this is compiled.
-#include "vector.cl"
+#include "core/vector.cl"
 
 typedef struct { real t, u, v; ireal primitive, instance; } Hits;   // primitive < 0: miss
 

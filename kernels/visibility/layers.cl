@@ -3,9 +3,9 @@
 // Such a surface stops a ray with the probability of its opacity, and attenuates a shadow ray by it. The ray keeps its
 // origin, and the next surface follows in the order of hits (next_hit): each counts once, however many there are, also
 // if they touch or coincide. A ray that leaves one of several coincident surfaces starts beyond all of them.
-#include "opacity.cl"
-#include "bsdf.cl"
-#include "sampler.cl"
+#include "surface/opacity.cl"
+#include "bsdf/dispatch.cl"
+#include "sampler/interface.cl"
 
 // The first surfaces that stop rays whose closest hits are known; on a miss any surface. from_camera: see opacity_at.
 static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 origin, real3 direction,

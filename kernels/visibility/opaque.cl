@@ -1,6 +1,6 @@
 // Visibility with opaque surfaces only; from_camera is ignored.
-#include "surface.cl"
-#include "sampler.cl"
+#include "surface/surface.cl"
+#include "sampler/interface.cl"
 
 // The surfaces at known closest hits; lanes that missed get that of primitive 0.
 static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 origin, real3 direction,

@@ -25,7 +25,7 @@ def test_a_device_passes(device: Device, part: str) -> None:
 
 
 def test_fma_of_plain_operations(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The replacement in kernels/fma.cl is also rounded once, so hits have the same bits."""
+    """The replacement in kernels/core/fma.cl is also rounded once, so hits have the same bits."""
     surface, hits = star.make_star(4), []
     rays = star.rays_from_elsewhere(surface, 1000)
     for fuses in (True, False):

@@ -77,7 +77,7 @@ def test_json_progress_is_a_line_an_object(tmp_path: Path) -> None:
     (["-q"], [], ["loading", "device 0"]),
     ([], ["loading the scene", "rendering", "4 spp", "writing"], ["device", "program of"]),
     (["-v"], ["device ", "chosen as", "program of"], ["its files"]),
-    (["-vv"], ["device ", "its files: ", "edge.cl"], [])])
+    (["-vv"], ["device ", "its files: ", "integrator/path_segment.cl"], [])])
 def test_how_much_is_told(tmp_path: Path, options: list[str], shown: list[str], hidden: list[str]) -> None:
     result = render(tmp_path, "--progress", "plain", *options)
     assert (result.returncode, result.stdout) == (0, "scene.png\n"), result.stderr

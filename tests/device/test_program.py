@@ -111,7 +111,7 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     used |= set(files_of(turns_source()))
     for file in kernel_calls.FILES:
         used |= set(files_of(kernel_calls.source(file, device.lanes)))
-    for entry in ("check/turns.cl", "fma.cl"):
+    for entry in ("check/turns.cl", "core/fma.cl"):
         used |= set(files_of(compose("", entry, {})))
     for shape in SHAPES.values():
         used |= set(files_of(program_source(shape, True, True, True)))
@@ -134,16 +134,18 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     for scene in (painted(everything()), planted(everything()), shelf(), *(sight for _, sight in sights(everything()))):
         used |= set(compile_scene(scene, Choices()).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
-    for entry in ("guides.cl", "debug.cl", "raster/outline.cl", "study/probe.cl", "study/raster_hits.cl"):
+    for entry in ("aov/denoiser_guides.cl", "integrator/debug.cl", "raster/outline.cl", "bench/probe.cl",
+                  "bench/raster_hits.cl"):
         used |= set(compile_scene(everything(), Choices(), entry).files)
     for name, file in (("MIS_WEIGHTS", "bsdf_sampling"), ("MIS_WEIGHTS", "light_sampling"),
                        ("LIGHT_CHOICE", "uniform_choice")):
         compiled = compile_scene(everything(), Choices())
-        used |= set(replace(compiled, chosen_files=compiled.chosen_files | {name: [f"study/{file}.cl"]}).files)
+        used |= set(replace(compiled, chosen_files=compiled.chosen_files | {name: [f"bench/{file}.cl"]}).files)
     assert sorted(used) == FILES
 
 
-@pytest.mark.parametrize("entry", ["the picture's", *others("guides.cl", "first hits", "debug.cl")])
+@pytest.mark.parametrize("entry", ["the picture's",
+                                   *others("aov/denoiser_guides.cl", "first hits", "integrator/debug.cl")])
 def test_programs_build_without_a_warning(device: Device, entry: str, capfd: pytest.CaptureFixture[str],
                                           tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Warnings would interrupt the progress bar on the terminal. Other messages of drivers are ignored."""
@@ -151,9 +153,9 @@ def test_programs_build_without_a_warning(device: Device, entry: str, capfd: pyt
     scene.spheres = scene.spheres + [type(scene.spheres[0])(material=material)
                                      for kind in MATERIALS for material in variants(kind)]
     compiled = compile_scene(scene, Choices(device.lanes, device.layout, direct_light=True))
-    sources = {"the picture's": compiled.source, "guides.cl": compiled.source_of("guides.cl"),
+    sources = {"the picture's": compiled.source, "aov/denoiser_guides.cl": compiled.source_of("aov/denoiser_guides.cl"),
                "first hits": first_hit_program(compiled, AOVS)[0],
-               "debug.cl": compiled.source_of("debug.cl", vertex_preamble())}
+               "integrator/debug.cl": compiled.source_of("integrator/debug.cl", vertex_preamble())}
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
     build(device, f"{sources[entry]}\n// its own text, so that no cache has it")
     log = cache_files.kept_logs()["build"]

@@ -230,9 +230,9 @@ def test_only_what_is_asked_for_is_compiled() -> None:
     """The image's program has no code for AOVs, except for direct or indirect light."""
     plain, light = (compile_scene(everything(), Choices(direct_light=apart)) for apart in (False, True))
     assert set(light.features) - set(plain.features) == {"DIRECT_LIGHT"} and light.files == plain.files
-    assert "first_hit.cl" not in plain.files
+    assert "aov/first_hit.cl" not in plain.files
     programs = {names: files_of(first_hit_program(plain, names)[0]) for names in (("depth",), ("albedo",))}
-    assert "first_hit.cl" in programs["depth",] and "bsdf.cl" in programs["albedo",]
+    assert "aov/first_hit.cl" in programs["depth",] and "bsdf/dispatch.cl" in programs["albedo",]
     assert not any(name.startswith(("bsdf", "light")) for name in programs["depth",])
     for names, apart in (("albedo,depth,variance,samples", False), ("direct", True), ("indirect", True)):
         assert Renderer(everything(), aovs=names).compiled.choices.direct_light == apart

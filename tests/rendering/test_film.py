@@ -16,7 +16,7 @@ from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 from ..covering import others
 from .pictures import box, film, quad
 
-#: Text of film.cl and replacements that make sums stall: no compensation, and one that drops the previous error.
+#: Text of film/film.cl and replacements that make sums stall: no compensation, and one that drops the previous error.
 STALLING = {"plain": ("    *sum = s + e;\n    *error = e - (*sum - s);", "    *sum = s;\n    *error = 0.0f;"),
             "forgetful": ("real e = *error + (", "real e = (")}
 

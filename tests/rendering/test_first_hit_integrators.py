@@ -119,7 +119,7 @@ def test_no_light_is_compiled_or_missed(device: Device, integrator: Integrator,
     """No warning about darkness, no light code, no black pixels; SIMD widths agree."""
     scene = replace(everything(), render=replace(everything().render, integrator=integrator))
     compiled = session(device, scene).compiled
-    assert not [file for file in compiled.files if file.startswith("light") or file == "edge.cl"]
+    assert not [file for file in compiled.files if file.startswith("light") or file == "integrator/path_segment.cl"]
     pictures = [film(device, scene, lanes=lanes).mean for lanes in (1, 8)]
     differs = np.any(np.abs(pictures[0] - pictures[1]) > 1e-5 * (np.abs(pictures[1]) + 0.1), axis=2)
     assert np.mean(differs) < 1e-3

@@ -134,4 +134,5 @@ def test_lanes_agree_and_paths_pay_nothing(device: Device) -> None:
     one, eight = (film(device, scene, spp=4, lanes=lanes).mean for lanes in (1, 8))
     np.testing.assert_allclose(one, eight, rtol=1e-4, atol=1e-6)
     compiled = compile_scene(replace(scene, render=RenderSettings()), Choices())
-    assert "LOCAL" not in compiled.features and "whitted.cl" not in compiled.files and compiled.kernel == "wave"
+    assert "LOCAL" not in compiled.features and compiled.kernel == "wavefront"
+    assert "integrator/local.cl" not in compiled.files

@@ -139,5 +139,5 @@ def test_a_clear_lamp_gives_less_light(device: Device) -> None:
 def test_opaque_scenes_have_no_code_for_it(device: Device) -> None:
     plain = Renderer(Scene(meshes=[quad(Diffuse())]), device=device.info.index).compiled
     clear = Renderer(Scene(meshes=[quad(Diffuse(opacity=0.5))]), device=device.info.index).compiled
-    assert "visibility/opaque.cl" in plain.files and "opacity.cl" not in plain.files
-    assert {"visibility/layers.cl", "opacity.cl"} <= set(clear.files)
+    assert "visibility/opaque.cl" in plain.files and "surface/opacity.cl" not in plain.files
+    assert {"visibility/layers.cl", "surface/opacity.cl"} <= set(clear.files)

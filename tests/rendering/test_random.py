@@ -12,7 +12,7 @@ from clrt.device.open import Device
 from clrt.scene.model import RenderSettings, Scene
 
 COUNT = 1 << 15
-#: Text of rng.cl and replacements that weaken it: fewer rounds, exchangeable, truncated or ignored indices.
+#: Text of core/rng.cl and replacements that weaken it: fewer rounds, exchangeable, truncated or ignored indices.
 WEAK = {
     "no second round": ("    x += y * w; y += z * x; z += x * y; w += y * z;\n    return", "    return"),
     "exchangeable": ("hash4(sampler->pixel, sampler->sample,", "hash4(sampler->pixel ^ sampler->sample, (ureal)(0),"),

@@ -11,6 +11,7 @@ import pytest
 from clrt.device.open import Device
 from clrt.errors import UsageError
 from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import MEGAKERNEL, WAVEFRONT
 from clrt.rendering.film.film import Film
 from clrt.rendering.film.tiles import tile_sums
 from clrt.rendering.renderer import Renderer
@@ -40,7 +41,7 @@ def followed(device: Device, paths: str, scene: Scene, *parts: int, **chosen: An
     for samples in parts or [SPP]:
         for _ in running.render(samples):
             pass
-    assert running.compiled.entry == {"lanes": "integrate.cl", "waves": "wave.cl"}[paths]
+    assert running.compiled.entry == {"lanes": MEGAKERNEL, "waves": WAVEFRONT}[paths]
     return running.film()
 
 

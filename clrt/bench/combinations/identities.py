@@ -54,13 +54,13 @@ def strategies(scene: Scene, draws: Draws) -> list[Side]:
 
     Each leaves to the other what it cannot sample: delta lights, specular directions, environments below their mean.
     """
-    return [Side("both", [scene]), Side("BSDF sampling", [scene], {"MIS_WEIGHTS": ["study/bsdf_sampling.cl"]}),
-            Side("light sampling", [scene], {"MIS_WEIGHTS": ["study/light_sampling.cl"]})]
+    return [Side("both", [scene]), Side("BSDF sampling", [scene], {"MIS_WEIGHTS": ["bench/bsdf_sampling.cl"]}),
+            Side("light sampling", [scene], {"MIS_WEIGHTS": ["bench/light_sampling.cl"]})]
 
 
 def choice(scene: Scene, draws: Draws) -> list[Side]:
     """The mean does not depend on the light selection probabilities."""
-    return [Side("by importance", [scene]), Side("uniformly", [scene], {"LIGHT_CHOICE": ["study/uniform_choice.cl"]})]
+    return [Side("by importance", [scene]), Side("uniformly", [scene], {"LIGHT_CHOICE": ["bench/uniform_choice.cl"]})]
 
 
 def integrators(scene: Scene, draws: Draws) -> list[Side]:

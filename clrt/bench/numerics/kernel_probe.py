@@ -1,4 +1,4 @@
-"""Calls kernel functions on arrays: a scene's program with kernels/study/probe.cl in place of path.cl."""
+"""Calls kernel functions on arrays: a scene's program with kernels/bench/probe.cl in place of integrator/path.cl."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Probe:
 
     def __init__(self, device: Device, scene: Scene, defines: str = "", changes: Mapping[str, str] | None = None,
                  **chosen: Any) -> None:
-        self.compiled = compile_scene(scene, choices(device, **chosen), "study/probe.cl")
+        self.compiled = compile_scene(scene, choices(device, **chosen), "bench/probe.cl")
         source = f"{defines}\n{self.compiled.source}"
         for text, other in (changes or {}).items():
             source = source.replace(text, other)

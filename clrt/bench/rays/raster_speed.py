@@ -1,4 +1,4 @@
-"""First hits of a camera, rasterized and traced through the same positions (kernels/study/raster_hits.cl)."""
+"""First hits of a camera, rasterized and traced through the same positions (kernels/bench/raster_hits.cl)."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def seen_both_ways(device: Device, scene: Scene, sample: int = 0, **chosen: Any)
     tiles = np.arange(np.prod(tiles_of(size)), dtype=np.uint32)
     launch["pixel_count"], launch["first_sample"] = len(tiles) * TILE_PIXELS, sample
     arguments = [*(on_device(device, array) for _, array in compiled.buffers.values()), compiled.counts[0]]
-    program = build(device, compiled.source_of("study/raster_hits.cl", typedefs({"Seen": SEEN})))
+    program = build(device, compiled.source_of("bench/raster_hits.cl", typedefs({"Seen": SEEN})))
     kernel = make_kernel(device, program, "raster_hits")
     seen = [empty_array(device, SEEN, width * height) for _ in range(2)]
     given = [*(each.buffer for each in seen), on_device(device, tiles), launch[0]]   # kernels keep no references

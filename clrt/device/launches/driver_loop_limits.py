@@ -3,7 +3,7 @@
 Mesa's llvmpipe limits each vector of work-items to 65 535 loop iterations in total, counting nested loops and those of
 all functions; after that every loop ends after its first iteration, without an error. (LP_MAX_TGSI_LOOP_ITERATIONS, a
 guard against endless shaders.) With such a limit, launches are split to stay below it, and kernels verify that they did
-(kernels/loops.cl).
+(kernels/core/loop_limit.cl).
 """
 
 from __future__ import annotations

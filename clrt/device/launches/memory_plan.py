@@ -13,7 +13,8 @@ from ...errors import NoRoomError
 from ..discovery.device_info import DeviceInfo
 from .buffer_limit import VARIABLE
 
-#: Records that a part shares with the next one, so that a leaf's records are never in two parts (kernels/arrays.cl).
+#: Records that a part shares with the next one, so that a leaf's records are never in two parts
+#: (kernels/core/arrays.cl).
 OVERLAP = 16
 
 

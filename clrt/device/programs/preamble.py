@@ -18,7 +18,7 @@ def scene_struct(buffers: Buffers, part_bytes: int | None = None) -> str:
     """Return the struct `Scene`, its kernel parameters (SCENE_PARAMETERS) and its initialiser (SCENE_ARGUMENTS).
 
     The order of `buffers` is the order of the kernel's arguments; the counts come last. part_bytes: maximum size of the
-    parts that all buffers are split into (kernels/arrays.cl), None for whole buffers.
+    parts that all buffers are split into (kernels/core/arrays.cl), None for whole buffers.
     """
     typedefs = {c_type: c_typedef(c_type, array.dtype) for c_type, array in buffers.values()}
     members = [f"global const {c_type} *{name}" for name, (c_type, _) in buffers.items()]

@@ -90,7 +90,7 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
     """Build `source` for the device, or take it from memory or the cache. Raises KernelError with the log on failure.
 
     PoCL caches compiled kernels itself; clrt's cache then holds bitcode, or an empty entry to record that a program was
-    built. If the device has no fma instruction, kernels/fma.cl is prepended. data_bytes: approximate size of the
+    built. If the device has no fma instruction, kernels/core/fma.cl is prepended. data_bytes: approximate size of the
     program's data; for large data PoCL's front end runs in the compile process (aside.py).
     """
     start = time.perf_counter()
@@ -163,7 +163,7 @@ def program_key(device: Device, source: str) -> str:
 
 def _whole(device: Device, source: str) -> str:
     """Return the source, preceded by functions that the device lacks."""
-    return source if device.fuses else compose("", "fma.cl", {}) + source
+    return source if device.fuses else compose("", "core/fma.cl", {}) + source
 
 
 def _ending(device: Device, key: str) -> str:

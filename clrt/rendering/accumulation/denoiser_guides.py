@@ -22,5 +22,5 @@ def render_guides(session: Accumulation, samples: int = SAMPLES) -> dict[str, ND
     At mirrors and glass they are those of what is seen in them. The sky's albedo is its radiance, up to 1; it has no
     normal. Raises KernelError and DeviceError if the device fails.
     """
-    values = render_pixels(session, session.compiled.source_of("guides.cl"), "guides", GUIDE, samples)
+    values = render_pixels(session, session.compiled.source_of("aov/denoiser_guides.cl"), "guides", GUIDE, samples)
     return {name: np.ascontiguousarray(values[name]) for name in GUIDE.names or () if not name.startswith("pad")}

@@ -1,4 +1,4 @@
-"""First-hit AOVs: what each pixel's camera rays hit first (kernels/first_hit.cl)."""
+"""First-hit AOVs: what each pixel's camera rays hit first (kernels/aov/first_hit.cl)."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[
     kind = record(**fields)
     defines = [f"#define {macro}(X) {' '.join(f'X({name})' for name in listed)}" for macro, listed in lists.items()]
     bent = "normal" in names and "NORMAL_MAPS" in compiled.features
-    materials = ["bsdf.cl"] if bent or "albedo" in names else []
-    return compiled.source_of("first_hit.cl", f"#define SEEN_MATERIALS {len(materials)}", typedefs({"FirstHit": kind}),
-                              *defines, SEEN_FILES=materials), kind
+    materials = ["bsdf/dispatch.cl"] if bent or "albedo" in names else []
+    return compiled.source_of("aov/first_hit.cl", f"#define SEEN_MATERIALS {len(materials)}",
+                              typedefs({"FirstHit": kind}), *defines, SEEN_FILES=materials), kind
 
 
 def _places(session: Accumulation, seen: NDArray[np.float64],

@@ -37,7 +37,8 @@ def first_launch_samples(compiled: CompiledScene) -> int:
 
 
 def block_bits(planned_spp: int | None) -> int:
-    """Return log2 of the samples that a pixel takes from one block of its sampler's sequence (kernels/sampler.cl).
+    """Return log2 of the samples that a pixel takes from one block of its sampler's sequence
+    (kernels/sampler/interface.cl).
 
     This is the smallest power of two that covers `planned_spp`; 32, i.e. unlimited, if the sample count is not known.
     """

@@ -22,7 +22,7 @@ from ...device.programs.program import BuiltProgram, build, make_kernel
 from ...errors import NoRoomError
 from ...scene.model import Camera
 from ..compile.camera_kernel import CAMERA_FIELDS, launch_record
-from ..compile.compile_scene import CompiledScene
+from ..compile.compile_scene import RASTER, CompiledScene
 from .checked_loops import most_samples
 from .raster_bins import RasterBins
 
@@ -69,7 +69,7 @@ class SceneOnDevice:
         self._kernel = make_kernel(device, self.program, compiled.kernel)
         #: Leading arguments of every kernel of the scene (SCENE_PARAMETERS).
         self.scene_arguments = [*sum(self._buffers.values(), []), compiled.counts[0]]
-        if compiled.entry == "raster.cl":
+        if compiled.entry == RASTER:
             self._bins = RasterBins(device, compiled, self.scene_arguments)
         self.build_seconds = 0.0 if self._warm else self.program.build_seconds
 

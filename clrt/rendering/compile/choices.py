@@ -24,12 +24,12 @@ LANES = (1, 8, 16)
 class Choices:
     """Program options. lanes: see LANES; offset: see OFFSETS; direct_light: whether the film stores it separately.
 
-    paths: "lanes" for the megakernel, one path per lane (kernels/path.cl), or "waves" for the wavefront, which advances
-    many paths together by one vertex at a time (kernels/wave.cl); None for the wavefront if there are 8 lanes, as it
-    needs. layout: a name in TREES, or None for the one that fits the device and the scene. tree: False for brute force
-    (no BVH), True for a BVH even for few primitives; None for the faster one. first_hits: whether first hits are
-    requested along with the image, as AOVs, by a denoiser or by a user: then rays are traced whatever the integrator
-    does. Raises UsageError for unknown values and for options that exclude each other.
+    paths: "lanes" for the megakernel, one path per lane (kernels/integrator/path.cl), or "waves" for the wavefront,
+    which advances many paths together by one vertex at a time (kernels/integrator/wavefront.cl); None for the wavefront
+    if there are 8 lanes, as it needs. layout: a name in TREES, or None for the one that fits the device and the scene.
+    tree: False for brute force (no BVH), True for a BVH even for few primitives; None for the faster one. first_hits:
+    whether first hits are requested along with the image, as AOVs, by a denoiser or by a user: then rays are traced
+    whatever the integrator does. Raises UsageError for unknown values and for options that exclude each other.
     """
 
     lanes: int = 8

@@ -26,6 +26,11 @@ from .geometry.pack_instances import ObjectIds
 from .pack_scene import pack_scene
 from .reuse_cache import ReuseCache
 
+MEGAKERNEL, WAVEFRONT, RASTER = "integrator/megakernel.cl", "integrator/wavefront.cl", "integrator/raster.cl"
+DEBUG = "integrator/debug.cl"
+#: Names of the kernels that trace paths, by file.
+KERNELS = {MEGAKERNEL: "megakernel", WAVEFRONT: "wavefront", RASTER: "raster", DEBUG: "debug"}
+
 
 @dataclass(frozen=True)
 class CompiledScene:
@@ -33,8 +38,8 @@ class CompiledScene:
 
     All points, including the camera's, are in the coordinates of `frame` (see scene.scaling). instances: the number of
     instances in the BVH; others became meshes (see scene.instancing). part_bytes: maximum size of the parts into which
-    the arrays are split, as the device has no larger buffers (kernels/arrays.cl). clamps: of direct and of indirect
-    light, infinite for none.
+    the arrays are split, as the device has no larger buffers (kernels/core/arrays.cl). clamps: of direct and of
+    indirect light, infinite for none.
     """
 
     buffers: Buffers
@@ -77,12 +82,12 @@ class CompiledScene:
     @property
     def kernel(self) -> str:
         """Name of the entry's kernel."""
-        return self.entry.removesuffix(".cl")
+        return KERNELS[self.entry]
 
     @property
     def pixels(self) -> int:
         """Pixels per work-item of the entry's kernel."""
-        whole = self.entry == "wave.cl" or (self.entry == "raster.cl" and self.choices.lanes > 1)
+        whole = self.entry == WAVEFRONT or (self.entry == RASTER and self.choices.lanes > 1)
         return TILE_PIXELS if whole else self.choices.lanes
 
     @property
@@ -114,7 +119,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     if entry is None:
         integrator = scene.render.integrator
         in_waves = integrator in WITH_LIGHT and choices.waves and "LOOP_LIMIT" not in features
-        entry = "raster.cl" if integrator == "raster" else "wave.cl" if in_waves else "integrate.cl"
+        entry = RASTER if integrator == "raster" else WAVEFRONT if in_waves else MEGAKERNEL
     return CompiledScene(packed.buffers, packed.counts, sorted(features),
                          preamble_of(packed, choices, features, part_bytes), files_for(packed, choices, features),
                          entry, packed.tree, choices, packed.scene.camera, packed.frame,

@@ -19,9 +19,10 @@ from .pixel_filters import filter_reach
 from .records import COUNTS, GUIDE, LAUNCH, OUTLINE
 
 #: Path-tracing integrators, and the kernel files of the integrators that compute light; others show first hits
-#: (kernels/picture.cl).
+#: (kernels/integrator/first_surface.cl).
 WITH_LIGHT = ("path", "direct")
-INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl", "raster": "whitted.cl"}
+INTEGRATORS = {"path": "integrator/path.cl", "direct": "integrator/path.cl", "local": "integrator/local.cl",
+               "raster": "integrator/local.cl"}
 
 
 def biased_by(settings: RenderSettings) -> list[str]:
@@ -97,20 +98,21 @@ def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict
     return {**tree_files(packed.tree.name, choices.tests, bool(scene.meshes), bool(scene.spheres), packed.shapes.lone,
                          bool(scene.instances)),
             **{f"{part}_FILE": [f"bsdf/{part.lower()}.cl"] if part in features else [] for part in parts},
-            "PLACEMENT_FILE": ["placement.cl"] if scene.instances else [],
+            "PLACEMENT_FILE": ["surface/instance_transform.cl"] if scene.instances else [],
             "OFFSET": [OFFSETS[choices.offset]],
             "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in packed.materials.used],
-            "LIGHT_CHOICE": emitters.choice.files, "MIS_WEIGHTS": ["mis.cl"],
+            "LIGHT_CHOICE": emitters.choice.files, "MIS_WEIGHTS": ["integrator/mis.cl"],
             "LIGHT_TREE_FILE": ["light/tree.cl"] if emitters.choice.tree else [],
             "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else []),
             "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
-            "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
-            "TEXTURE_FILES": ["texture.cl"] if packed.uv_sets else [],
-            "NORMAL_MAPS_FILE": ["normal_maps.cl"] if packed.materials.normal_maps else [],
-            "HORIZON_FILE": ["horizon.cl"] if "HORIZON" in features else [],
+            "OPACITY_FILE": ["surface/opacity.cl"] if "OPACITY" in features else [],
+            "TEXTURE_FILES": ["surface/texture.cl"] if packed.uv_sets else [],
+            "NORMAL_MAPS_FILE": ["surface/normal_maps.cl"] if packed.materials.normal_maps else [],
+            "HORIZON_FILE": ["surface/horizon.cl"] if "HORIZON" in features else [],
             "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(scene.camera, integrator)],
-            "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"],
-            "INTEGRATOR": [INTEGRATORS.get(integrator, "picture.cl")], "PICTURE": [f"picture/{integrator}.cl"]}
+            "FILTER": ["film/box_filter.cl" if scene.render.filter == "box" else "film/table_filter.cl"],
+            "INTEGRATOR": [INTEGRATORS.get(integrator, "integrator/first_surface.cl")],
+            "PICTURE": [f"integrator/first_surface_{integrator}.cl"]}
 
 
 def _numbered(kinds: Iterable[type[Material]]) -> list[tuple[str, int]]:

@@ -1,4 +1,4 @@
-"""Quantiles of pixel filters, by which the kernels sample positions in and around a pixel (kernels/filter)."""
+"""Quantiles of pixel filters, by which the kernels sample positions in and around a pixel (kernels/film)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .records import FILTER
 
 Doubles = NDArray[np.float64]
-#: Quantiles are tabulated at 0, 1/CELLS … 1; kernels/filter/table.cl uses the same number.
+#: Quantiles are tabulated at 0, 1/CELLS … 1; kernels/film/table_filter.cl uses the same number.
 CELLS = 1024
 #: Bisection steps, after which a quantile is exact to float64 precision.
 BISECTIONS = 54

@@ -16,8 +16,8 @@ COLORS = record(c0="4f4", c1="4f4", c2="4f4")
 #: sign: of the bitangent, or 0 where there is no tangent.
 TANGENTS = record(t0="3f4", sign="f4", t1="3f4", pad1="f4", t2="3f4", pad2="f4")
 SPHERE = record(center="3f4", radius="f4", material="i4", light="i4", pad="2i4")
-#: An instance (kernels/placement.cl). first: its mesh's first triangle; material: a code, or −1 for the triangles' own;
-#: unit: 1 over the greatest entry of the matrix, negative if it mirrors.
+#: An instance (kernels/surface/instance_transform.cl). first: its mesh's first triangle; material: a code, or −1 for
+#: the triangles' own; unit: 1 over the greatest entry of the matrix, negative if it mirrors.
 PLACEMENT = record(to_world="(3,4)f4", rounding0="3f4", first="i4", rounding1="3f4", material="i4", rounding2="3f4",
                    unit="f4")
 
@@ -59,7 +59,7 @@ TEXTURE = record(u_row="3f4", width="i4", v_row="3f4", height="i4", first="i4", 
 TEXEL = np.dtype([("rgba", "u4")])
 #: Linear value of an sRGB-encoded byte.
 LINEAR = np.dtype([("linear", "f4")])
-#: Denoiser guides of a pixel (kernels/guides.cl); every field not named pad is an image.
+#: Denoiser guides of a pixel (kernels/aov/denoiser_guides.cl); every field not named pad is an image.
 GUIDE = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
 #: If DIRECT_LIGHT is compiled in, a pixel also stores the sum of its samples' direct light.
 DIRECT = record(direct="3f4", pad0="u4", direct_error="3f4", pad1="u4")

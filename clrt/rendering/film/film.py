@@ -1,4 +1,4 @@
-"""Accumulated image on the host: mean, error estimate and counts from the device's sums (kernels/film.cl)."""
+"""Accumulated image on the host: mean, error estimate and counts from the device's sums (kernels/film/film.cl)."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Film:
 
     def _variance(self, rows: slice) -> NDArray[np.float64]:
         """Return `variance` for these rows; mean², its upper bound, where squares were too large to be summed
-        (film.cl)."""
+        (film/film.cl)."""
         pixels, most = self.pixels[rows], self.mean[rows] ** 2
         count = pixels["count"].astype(np.float64)[..., None]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -156,7 +156,7 @@ class Film:
     @property
     def rays(self) -> int:
         """Number of rays traced; each counter wraps at 2³², long after its image has converged. All rays of a tile may
-        be counted in its first pixel (kernels/wave.cl)."""
+        be counted in its first pixel (kernels/integrator/wavefront.cl)."""
         return self._totals["rays"]
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Packing of triangles, their normals, and spheres (kernels/surface.cl)."""
+"""Packing of triangles, their normals, and spheres (kernels/surface/surface.cl)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Packing of instances: their two-level BVH, and their transforms (kernels/placement.cl)."""
+"""Packing of instances: their two-level BVH, and their transforms (kernels/surface/instance_transform.cl)."""
 
 from __future__ import annotations
 

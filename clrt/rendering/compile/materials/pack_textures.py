@@ -1,4 +1,5 @@
-"""Packing of textures: the texels of all images in one buffer, and a record for each texture (kernels/texture.cl)."""
+"""Packing of textures: the texels of all images in one buffer, and a record for each texture
+(kernels/surface/texture.cl)."""
 
 from __future__ import annotations
 

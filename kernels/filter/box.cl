@@ -1,4 +1,0 @@
-// Box filter: uniform over the pixel.
-#include "lanes.cl"
-
-static inline real filter_sample(const Scene *scene, real u) { return u; }

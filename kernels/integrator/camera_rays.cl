@@ -1,0 +1,63 @@
+// The pixels of a work-item and the camera rays through them. World frame.
+//
+// The camera's file in camera/ provides, for the image position (sx, sy), from (−1, −1) at the upper left corner to
+// (1, 1) at the lower right, slightly beyond with a wide filter:
+//
+//   ray_through(launch, sx, sy, &sampler)     the camera ray; cameras without random numbers leave `sampler` alone
+//
+// Each file documents the meaning of launch->right, up and forward; clrt/rendering/compile/camera_kernel.py computes
+// them.
+#include "sampler/interface.cl"
+#include "core/vector.cl"
+#include FILTER
+
+typedef struct { real3 origin, direction; } CameraRay;   // direction: unit
+
+#include CAMERA
+
+// The pixels of a work-item's lanes: LANES pixels of a tile of TILE x TILE. A launch covers pixels from first_pixel
+// on, in the order of `tiles`, row by row within each tile. A lane outside the image gets the pixel of the first lane
+// and is not `inside`.
+typedef struct {
+    ureal index, x, y, code;   // index: in the film, which covers the image or, if FILM_WINDOWS, the launch
+    ireal inside;
+} LanePixels;
+
+// Compute the pixels of group `group` of the launch; return false if the group is past its end.
+static inline bool group_pixels(const Launch *launch, global const uint *tiles, uint group, LanePixels *p) {
+    uint first = group * LANES;
+    if (first >= launch->pixel_count) return false;
+    first += launch->first_pixel;
+    uint across = (launch->width + TILE - 1) / TILE, tile = tiles[first / (TILE * TILE)];
+    uint first_x = tile % across * TILE + first % TILE, first_y = tile / across * TILE + first / TILE % TILE;
+    p->x = first_x + LANE_INDEX % TILE;
+    p->y = first_y + LANE_INDEX / TILE;
+    p->inside = (p->x < launch->width) & (p->y < launch->height);
+    if (!ANY(p->inside)) return false;
+    p->x = p->inside ? p->x : first_x;
+    p->y = p->inside ? p->y : first_y;
+#if FILM_WINDOWS
+    p->index = first - launch->first_pixel + (p->inside ? LANE_INDEX : (ureal)(0));
+#else
+    p->index = p->y * launch->width + p->x;
+#endif
+    p->code = pixel_code(p->x, p->y);
+    return true;
+}
+
+static inline bool lane_pixels(const Launch *launch, global const uint *tiles, LanePixels *p) {
+    return group_pixels(launch, tiles, (uint)get_global_id(0), p);
+}
+
+// Return the image position (sx, sy) of a sample in pixel (x, y): u samples the filter around the pixel centre, u =
+// (½, ½).
+static inline real2 place_in_pixel(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u) {
+    return (real2){2.0f * (TO_REAL(x) + filter_sample(scene, u.x)) / (float)launch->width - 1.0f,
+                   2.0f * (TO_REAL(y) + filter_sample(scene, u.y)) / (float)launch->height - 1.0f};
+}
+
+// Return a camera ray through pixel (x, y), filter-sampled by u.
+static inline CameraRay camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u, Sampler *sampler) {
+    real2 place = place_in_pixel(scene, launch, x, y, u);
+    return ray_through(launch, place.x, place.y, sampler);
+}

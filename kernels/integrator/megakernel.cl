@@ -1,0 +1,42 @@
+// Megakernel: each lane computes one sample at a time; a work-item renders LANES pixels with `sample_count` samples
+// each.
+//
+// INTEGRATOR provides
+//
+//   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct, &removed)
+//                                         radiance along the camera rays, 0 in inactive lanes; adds the number of rays
+//                                         traced to `rays`; sets `direct` if DIRECT_LIGHT is compiled in; adds the
+//                                         energy removed by clamping to `removed` if CLAMP is
+//
+// PIXEL_MIDDLE: all samples use the ray through the pixel centre.
+#include "integrator/camera_rays.cl"
+#include "film/film.cl"
+#include INTEGRATOR
+
+__attribute__((vec_type_hint(real)))
+kernel void megakernel(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles, const Launch launch) {
+    Scene scene = SCENE_ARGUMENTS;
+    LanePixels own;
+    if (!lane_pixels(&launch, tiles, &own)) return;
+    Accumulator pixels = load_pixels(film, AS_INT(own.index));
+    for (uint s = 0; s < launch.sample_count; ++s) {
+        Sampler sampler = sampler_at(own.code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
+#if PIXEL_MIDDLE
+        real2 place = {(real)(0.5f), (real)(0.5f)};
+#else
+        real2 place = next_2d(&sampler);
+#endif
+        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, place, &sampler);
+        real3 direct;
+        real removed = ZERO;
+        real3 seen = seen_along(&scene, &launch, &ray, own.inside, &sampler, &pixels.rays, &direct, &removed);
+        ireal kept = accumulate(&pixels, seen, own.inside);
+#if CLAMP
+        pixels.clamped += kept ? removed : ZERO;
+#endif
+#if DIRECT_LIGHT
+        accumulate_direct(&pixels, direct, kept);
+#endif
+    }
+    store_pixels(film, own.index, own.inside, &pixels);
+}
