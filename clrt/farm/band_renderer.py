@@ -20,7 +20,6 @@ from ..rendering.renderer import Renderer
 from ..rendering.stop_conditions import planned_spp
 from .orders import PictureOrder
 
-
 #: The renderer of the last order: frames and bands of one scene share its BVH and program.
 _kept: dict[str, Renderer] = {}
 

@@ -25,8 +25,7 @@ from ..output.scenes import save_scene
 from ..scene.editing import materials_of, with_material
 from ..scene.lights import DirectionalLight
 from ..scene.materials.material import Material
-from ..scene.model import Camera, Instance, Scene, Sphere
-from ..scene.model import Source
+from ..scene.model import Camera, Instance, Scene, Source, Sphere
 from .camera_controls import CameraControls
 from .navigation import around, distance
 from .screenshot import screenshot

@@ -17,7 +17,6 @@ from clrt.rendering.film.film import Film
 from clrt.scene.materials.material_types import Material
 from clrt.scene.model import Camera, Mesh, Sampler, Scene
 
-
 Doubles = NDArray[np.float64]
 
 

@@ -17,8 +17,17 @@ from clrt.scene.model import Camera, Integrator, Mesh, RenderSettings, Scene, Sp
 from . import rays
 from .lamps import directions
 from .pictures import film, quad
-from .test_lights import (COUNT, FAMILY, LAMP, POINTS, RADIANCE, assert_mean, irradiances, rectangle,
-                          rectangle_irradiance)
+from .test_lights import (
+    COUNT,
+    FAMILY,
+    LAMP,
+    POINTS,
+    RADIANCE,
+    assert_mean,
+    irradiances,
+    rectangle,
+    rectangle_irradiance,
+)
 
 pytestmark = pytest.mark.statistics
 

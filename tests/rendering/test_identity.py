@@ -23,8 +23,17 @@ from clrt.device.open import Device
 from clrt.farm.banded_picture import BandedPicture
 from clrt.farm.orders import PictureOrder
 from clrt.live.settings import Settings
-from clrt.rendering.checkpoint.identity import (CODE, ENDS, NAMES, ROUNDING, UNSEEN, code_digest, differences, facts_of,
-                                                scene_hash)
+from clrt.rendering.checkpoint.identity import (
+    CODE,
+    ENDS,
+    NAMES,
+    ROUNDING,
+    UNSEEN,
+    code_digest,
+    differences,
+    facts_of,
+    scene_hash,
+)
 from clrt.rendering.compile.choices import Choices
 from clrt.rendering.render_report import render_report
 from clrt.rendering.renderer_options import choices_of, settings_of

@@ -16,8 +16,18 @@ import numpy as np
 from ...scene.geometry.transform import rotation, scaling, transform_mesh, translation
 from ...scene.lights import LIGHTS, Light, SpotLight
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
-from ...scene.model import (Camera, Environment, FloatArray, Instance, Mesh, Projection, RenderSettings, Scene,
-                            Sphere, Vector)
+from ...scene.model import (
+    Camera,
+    Environment,
+    FloatArray,
+    Instance,
+    Mesh,
+    Projection,
+    RenderSettings,
+    Scene,
+    Sphere,
+    Vector,
+)
 from ..rays.shapes import icosphere
 from .random_draws import Draws
 

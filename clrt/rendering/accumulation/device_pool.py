@@ -24,7 +24,7 @@ from ...device.open import Device
 from ...errors import DeviceError, KernelError
 from ..compile.compile_scene import CompiledScene
 from ..film.tiles import TILE_PIXELS
-from .device_worker import WorkerShare, DeviceWorker
+from .device_worker import DeviceWorker, WorkerShare
 from .launch_plan import FEWEST_TILES
 from .scene_on_device import SceneOnDevice
 from .work_queue import WorkQueue
