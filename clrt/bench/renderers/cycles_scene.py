@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,8 @@ NEAR, FAR = 1e-4, 1e6
 SUBDIVISIONS = 6
 #: Power in W of a point light of 1 W/sr in all directions.
 POINT_WATT = 4 * np.pi
+#: Why a light with a falloff of its own is not exported.
+FALLOFF = "ranges and spot lights fall off differently in Cycles and are not exported"
 
 
 def check_scene(scene: Scene) -> None:
@@ -43,7 +45,7 @@ def check_scene(scene: Scene) -> None:
         if isinstance(owner.material, Dielectric) and owner.material.features() != {"TRANSMISSION"}:
             raise UsageError(f"{owner.name}: Cycles supports dielectric that is smooth, not thin, and absorbs nothing")
     if any(isinstance(light, SpotLight) or getattr(light, "range", None) for light in scene.lights):
-        raise UsageError(f"{scene.name}: ranges and spot lights fall off differently in Cycles and are not exported")
+        raise UsageError(f"{scene.name}: {FALLOFF}")
     if scene.camera.projection != "perspective" or scene.camera.aperture_radius:
         raise UsageError(f"{scene.name}: only pinhole cameras are exported to Cycles")
     if scene.render.integrator == "local":
@@ -179,18 +181,29 @@ def sphere_triangles(sphere: Sphere) -> tuple[NDArray[Any], NDArray[Any], NDArra
 
 
 def _light(data: Any, light: Light) -> tuple[Any, NDArray[np.float64]]:
-    """Return the light, which emits along its −z, and its matrix to the world."""
-    if isinstance(light, PointLight):
-        made = data.lights.new("light", "POINT")
-        made.shadow_soft_size, made.energy, made.color = 0.0, POINT_WATT, light.intensity
-        return made, frame_of_axes(np.eye(3), light.position)
-    assert isinstance(light, DirectionalLight)
-    made = data.lights.new("light", "SUN")
-    made.angle, made.energy, made.color = np.radians(light.angle_degrees), 1.0, light.irradiance
-    z = -np.asarray(light.direction) / np.linalg.norm(light.direction)
+    """Return the light, which emits along its −z, and its matrix to the world. Raises UsageError if it has no
+    counterpart."""
+    match light:
+        case PointLight():
+            made = data.lights.new("light", "POINT")
+            made.shadow_soft_size, made.energy, made.color = 0.0, POINT_WATT, light.intensity
+            return made, frame_of_axes(np.eye(3), light.position)
+        case DirectionalLight():
+            made = data.lights.new("light", "SUN")
+            made.angle, made.energy, made.color = np.radians(light.angle_degrees), 1.0, light.irradiance
+            return made, frame_of_axes(_axes(light.direction), (0, 0, 0))
+        case SpotLight():
+            raise UsageError(f"light: {FALLOFF}")
+        case _:
+            assert_never(light)
+
+
+def _axes(direction: ArrayLike) -> NDArray[np.float64]:
+    """Return orthonormal axes (3, 3), one per row, the last of which is against the direction."""
+    z = -np.asarray(direction) / np.linalg.norm(direction)
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)
-    return made, frame_of_axes(np.array([x, np.cross(z, x), z]), (0, 0, 0))
+    return np.array([x, np.cross(z, x), z])
 
 
 def _camera(data: Any, camera: Camera) -> tuple[Any, NDArray[np.float64]]:
