@@ -14,7 +14,7 @@ from ..device.open import Device
 from ..device.programs.program import make_kernel
 from ..errors import UsageError
 from ..rendering.accumulation.checked_loops import check_paths
-from ..rendering.accumulation.launch_plan import depth_of, first_launch, first_launch_samples
+from ..rendering.accumulation.launch_plan import LaunchPlan, first_launch_samples
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
 from ..rendering.compile.choices import Choices, choices_on
 from ..rendering.compile.compile_scene import DEBUG, CompiledScene, compile_scene
@@ -79,9 +79,8 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
     _check(settings, pixel)
     compiled = compile_scene(scene, choices_on(device, choices, lanes), DEBUG, device)
     compiled = replace(compiled, preamble=f"{compiled.preamble}\n{vertex_preamble()}")
-    depth = depth_of(settings)
-    planned = most_planned(settings.spp, settings.adaptive)
-    launch = first_launch(compiled, settings.size, depth, settings.seed, planned)
+    plan = LaunchPlan.of(settings, most_planned(settings.spp, settings.adaptive))
+    launch, depth = plan.record(compiled), plan.max_depth
     launch["first_pixel"] = pixel[1] * settings.size[0] + pixel[0]
     batch = min(settings.spp, max(1, min(first_launch_samples(compiled), MOST_RECORDS // depth)))
     on_device = SceneOnDevice(device, compiled, launch, batch * depth * VERTEX.itemsize)

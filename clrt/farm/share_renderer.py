@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rendering.accumulation.launch_plan import depth_of
+from ..rendering.accumulation.launch_plan import LaunchPlan
 from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_pool
 from ..rendering.accumulation.work_queue import WorkPart, WorkQueue
 from ..rendering.compile.choices import choices_on
@@ -32,7 +32,7 @@ class ShareRenderer:
         devices = opened(order.devices)
         compiled = SceneCompiler(devices).compile(order.scene,
                                                   [choices_on(each, order.asked, order.lanes) for each in devices])
-        self._pool = make_pool(devices, compiled, settings.size, depth_of(settings), settings.seed, order.planned_spp)
+        self._pool = make_pool(devices, compiled, LaunchPlan.of(settings, order.planned_spp))
         # Its film uses no memory while it is empty.
         self._picture = MultiDeviceAccumulation(self._pool, settings.size)
         self._pixel = compiled[0].choices.pixel

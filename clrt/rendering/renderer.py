@@ -20,7 +20,7 @@ from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validation.validate import check_is_scene, validate
 from ..threads import Event
 from .accumulation.accumulation import Accumulation
-from .accumulation.launch_plan import depth_of
+from .accumulation.launch_plan import LaunchPlan
 from .accumulation.multi_device import make_picture
 from .accumulation.scene_on_device import SceneOnDevice
 from .aovs import Aovs
@@ -101,8 +101,7 @@ class Renderer:
         self.warnings = PictureWarnings(self.scene, self.compiled.features)
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
-        return make_picture(self.devices, self._compiled, self.settings.size, depth_of(self.settings),
-                            self.settings.seed, self._planned_spp, before)
+        return make_picture(self.devices, self._compiled, LaunchPlan.of(self.settings, self._planned_spp), before)
 
     @property
     def name(self) -> str:
