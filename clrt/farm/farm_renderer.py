@@ -48,19 +48,16 @@ class FarmRenderer(Renderer):
                 self._checkpoints.wait()
             raise
 
-    def _open(self, device: Selectors, lanes: int | None, on_phase: Callable[[str], None],
-              before: Renderer | None) -> None:
+    def _open(self, device: Selectors, on_phase: Callable[[str], None], before: Renderer | None) -> None:
         validate(self.scene)
         given = [device] if device is None or isinstance(device, str | int | Device) else list(device)
         selectors = tuple(each for each in given if isinstance(each, str | int))
         if len(selectors) < len(given) - (given == [None]):
             raise UsageError("a farm renders on its workers' devices; give their names instead of opened devices")
-        self.devices = []
-        self._lanes, self._selectors = lanes, selectors
+        self.devices, self._selectors = [], selectors
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> FarmAccumulation:
-        order = Order(self.scene, self.choices, self._lanes, self._planned_spp, self._selectors,
-                      self._simulated)
+        order = Order(self.scene, self.choices, self._planned_spp, self._selectors, self._simulated)
         picture = FarmAccumulation(self._cluster, order, self.choices.pixel)
         facts = picture.dispatch.wait_for()[0].facts or {}
         self.warnings = PictureWarnings(self.scene, facts["report"]["kernel"]["features"])

@@ -27,7 +27,6 @@ from .aovs import Aovs
 from .checkpoint.checkpoints import check_of_none, open_checkpoints
 from .checkpoint.saved_state import SavedState
 from .compile.camera_kernel import camera_file
-from .compile.choices import choices_on
 from .compile.compile_scene import CompiledScene
 from .compile.scene_compiler import SceneCompiler
 from .error_estimate.adaptive_sampling import most_planned
@@ -75,7 +74,7 @@ class Renderer:
         self.scene = replace(scene, render=settings_of(scene.render, options))
         self._aovs = Aovs(aovs, self.settings.integrator)
         self.choices = choices_of(options)
-        self._open(device, lanes, on_phase, before)
+        self._open(device, on_phase, before)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene, self.choices,
                                                    self.name)
         on_phase("compile")
@@ -90,14 +89,12 @@ class Renderer:
             self.seconds = kept.seconds
             self.state()
 
-    def _open(self, device: Selectors, lanes: int | None, on_phase: Callable[[str], None],
-              before: Renderer | None) -> None:
-        """Open the devices and compile the scene for them; without `lanes` each uses its preferred SIMD width."""
+    def _open(self, device: Selectors, on_phase: Callable[[str], None], before: Renderer | None) -> None:
+        """Open the devices and compile the scene for them."""
         self.device, *_ = self.devices = open_devices(device)
         on_phase("build")
         self._compiler: SceneCompiler = SceneCompiler.after(before._compiler if before else None, self.devices)
-        choices = [choices_on(each, self.choices, lanes) for each in self.devices]
-        self._compiled = self._compiler.compile(self.scene, choices, ahead=len(choices) == 1)
+        self._compiled = self._compiler.compile(self.scene, self.choices, ahead=len(self.devices) == 1)
         self.warnings = PictureWarnings(self.scene, self.compiled.features)
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:

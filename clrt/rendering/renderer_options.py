@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
-from ..accel.traversal_kernels import HitTests
+from ..accel.methods import HitTests
 from ..scene.model import RenderSettings
 from .aovs import chosen_aovs, needs_direct_light, seen_first
 from .compile.choices import Choices

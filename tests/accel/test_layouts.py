@@ -17,7 +17,7 @@ from clrt.accel.bvh import FloatArray
 from clrt.accel.cwbvh import CWBVH_NODE
 from clrt.accel.layouts import (BVH2_NODE, BVH8_NODE, LAYOUTS, LEAF_SPHERE, LEAF_TRIANGLE, LONE_PACK, TRIANGLE_PACK,
                                 Layout, pack, sphere_boxes)
-from clrt.accel.traversal_kernels import TREELESS
+from clrt.accel.methods import TREELESS
 from clrt.accel.wide import EMPTY
 from clrt.errors import UsageError
 

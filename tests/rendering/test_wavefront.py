@@ -91,4 +91,4 @@ def test_waves_need_eight_lanes(device: Device) -> None:
         Renderer(everything(), device=device.info.index, lanes=1, paths="waves")
     with pytest.raises(UsageError, match="paths 'rows' is unknown; choose from lanes, waves"):
         Renderer(everything(), device=device.info.index, paths="rows")
-    assert [Choices(lanes).waves for lanes in (1, 8, 16)] == [False, True, False]
+    assert [Choices(lanes).on(None).paths for lanes in (1, 8, 16)] == ["lanes", "waves", "lanes"]

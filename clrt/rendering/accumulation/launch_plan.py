@@ -7,7 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ...accel.traversal_kernels import TREELESS
+from ...accel.methods import TREELESS
 from ...scene.model import RenderSettings
 from ..compile.camera_kernel import launch_record
 from ..compile.compile_scene import CompiledScene
