@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from .materials.material import tuples_for_lists
+from .validation.tuples import tuples_for_lists
 from .materials.textures import NonNegative
 from .validation.limits import Gt, Lt
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from math import pi, radians, sin
 from typing import Annotated, ClassVar
 
-from .materials.material import Radiance, tuples_for_lists
+from .materials.material import Radiance
 from .validation.limits import Ge, Gt, Le, Lt
+from .validation.tuples import tuples_for_lists
 
 Length = Annotated[float, Gt(0)]
 

@@ -16,7 +16,8 @@ from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.film.film import Film
 from clrt.scene.materials.material_types import Material
-from clrt.scene.model import Camera, Mesh, Sampler, Scene
+from clrt.scene.model import Camera, Mesh, Scene
+from clrt.scene.render_settings import Sampler
 
 
 Doubles = NDArray[np.float64]

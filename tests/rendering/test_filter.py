@@ -10,7 +10,8 @@ from scipy.signal.windows import blackmanharris
 from clrt.device.open import Device
 from clrt.rendering.compile.pixel_filters import CELLS, FILTERS, filter_quantiles
 from clrt.scene.materials.material_types import Diffuse
-from clrt.scene.model import Camera, Filter, RenderSettings, Scene
+from clrt.scene.model import Camera, RenderSettings, Scene
+from clrt.scene.render_settings import Filter
 
 from clrt.bench.significance import rejected
 
