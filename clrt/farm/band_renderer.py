@@ -34,7 +34,7 @@ class BandRenderer(Renderer):
     def show(self, band: tuple[int, int]) -> None:
         """Start with tile rows first … end − 1."""
         self._band = band
-        self.session = self._make_picture()
+        self._progress.session = self._make_picture()
         self._begin()
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Unpack, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from ..errors import DeviceError, UsageError
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
 from ..rendering.render_warnings import PictureWarnings
 from ..rendering.renderer import Renderer, State
+from ..rendering.renderer_options import RendererOptions
 from ..scene.model import Camera, Scene
 from ..scene.validation.validate import validate
 from .cluster import Cluster
@@ -30,10 +31,8 @@ class FarmRenderer(Renderer):
     simulated: samples per second of workers that only sleep, to measure the overhead (simulated.py).
     """
 
-    session: FarmAccumulation
-
     def __init__(self, scene: Scene, cluster: Cluster, *, simulated: float | None = None,
-                 **options: Any) -> None:
+                 **options: Unpack[RendererOptions]) -> None:
         self._cluster, self._simulated = cluster, simulated
         super().__init__(scene, **options)
 
@@ -43,7 +42,7 @@ class FarmRenderer(Renderer):
         try:
             yield from super().passes(spp=spp, time=time, error=error, reference=reference)
         except DeviceError:
-            self._keep(last=True)
+            self._progress.save(last=True)
             if self._checkpoints is not None:
                 self._checkpoints.wait()
             raise
@@ -66,9 +65,14 @@ class FarmRenderer(Renderer):
     def _turn_to(self, camera: Camera) -> None:
         """Start a new image. Many images are better rendered by one worker each (whole_pictures.py)."""
         self.scene = replace(self.scene, camera=camera)
-        self.session = self._make_picture()
+        self._progress.session = self._make_picture()
+
+    @property
+    def session(self) -> FarmAccumulation:
+        """The samples of the image, on this client."""
+        return cast(FarmAccumulation, super().session)
 
     @property
     def name(self) -> str:
         """Return the names of all devices that render."""
-        return (self.session.told("name") if hasattr(self, "session") else "") or FARM
+        return (self.session.told("name") if hasattr(self, "_progress") else "") or FARM
