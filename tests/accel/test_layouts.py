@@ -26,7 +26,7 @@ from clrt.accel.layouts import (
     pack,
     sphere_boxes,
 )
-from clrt.accel.traversal_kernels import TREELESS
+from clrt.accel.methods import TREELESS
 from clrt.accel.wide import EMPTY
 from clrt.errors import UsageError
 

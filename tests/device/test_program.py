@@ -34,7 +34,8 @@ from clrt.rendering.compile.choices import OFFSETS, Choices
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.geometry import instancing
 from clrt.scene.materials.material_types import MATERIALS
-from clrt.scene.model import Environment, Filter, Sampler
+from clrt.scene.model import Environment
+from clrt.scene.render_settings import Filter, Sampler
 
 from ..covering import others
 from ..rendering.lamps import lamps

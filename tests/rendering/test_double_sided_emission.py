@@ -12,7 +12,8 @@ from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
 from clrt.rendering.film.film import Film
 from clrt.scene.materials.material_types import Diffuse
-from clrt.scene.model import Camera, Integrator, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from . import rays
 from .lamps import directions

@@ -18,8 +18,18 @@ from clrt.formats.load_scene import load
 from clrt.output.scenes import save_scene
 from clrt.rendering.compile.lights.light_types import LIGHT_KERNELS, TYPES
 from clrt.scene.geometry.scaling import SceneFrame, in_frame
-from clrt.scene.lights import (LENGTHS, LIGHTS, STRENGTHS, BaseLight, Bounds, DirectionalLight, DistantBounds, Light,
-                               PointLight, fields_of)
+from clrt.scene.lights import (
+    LENGTHS,
+    LIGHTS,
+    STRENGTHS,
+    BaseLight,
+    Bounds,
+    DirectionalLight,
+    DistantBounds,
+    Light,
+    PointLight,
+    fields_of,
+)
 from clrt.scene.materials.material import Radiance
 from clrt.scene.model import Scene
 from clrt.scene.validation.validate import validate

@@ -38,7 +38,7 @@ _log = logging.getLogger(__name__)
 class DevicePool:
     """Workers for a scene compiled for each device. Raises DeviceError, or the last one's KernelError, if none is left.
 
-    launch: see `first_launch`; tiles: maximum number of tiles of a film; before: see `SceneOnDevice`.
+    launches: see `LaunchPlan.record`; tiles: maximum number of tiles of a film; before: see `SceneOnDevice`.
     """
 
     def __init__(self, devices: Sequence[Device], compiled: Sequence[CompiledScene], launches: Sequence[NDArray[Any]],

@@ -12,7 +12,7 @@ from ...scene.materials.textures import Texture
 from ...scene.model import RenderSettings
 from ..film.tiles import TILE
 from .camera_kernel import camera_file
-from .choices import OFFSETS, Choices
+from .choices import OFFSETS, Choices, ResolvedChoices
 from .lights.light_types import SURFACES, TYPES
 from .pack_scene import PackedScene
 from .pixel_filters import filter_reach
@@ -61,7 +61,7 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
     return features | {name for name, present in has.items() if present}
 
 
-def preamble_of(packed: PackedScene, choices: Choices, features: set[str], part_bytes: int | None) -> str:
+def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str], part_bytes: int | None) -> str:
     """Return the definitions that precede all kernel files. part_bytes: see CompiledScene."""
     emitters, materials = packed.emitters, packed.materials
     # Only programs that use lengths in scene units depend on the unit: all others are shared between units.

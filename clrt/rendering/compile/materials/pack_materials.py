@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....scene.materials.layer_energy import ENTRY, Table
-from ....scene.materials.material import Culling, as_color
+from ....scene.materials.material import as_color
 from ....scene.materials.material_types import MATERIALS, Material
 from ....scene.materials.textures import Texture
+from ....scene.render_settings import Culling
 from ..records import LAYER_PARTS, parameter_record
 from .pack_textures import PackedTextures
 
