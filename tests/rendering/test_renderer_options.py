@@ -110,4 +110,4 @@ def test_wrong_keywords_are_wrong_types_too() -> None:
     with pytest.raises(UsageError, match="octree"):
         clrt.render(Scene(), layout="octree")  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="spp"):
-        clrt.animate(Scene(), spp="3").__next__()  # type: ignore[arg-type]
+        clrt.render(Scene(), spp="3")  # type: ignore[arg-type]
