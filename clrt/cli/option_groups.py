@@ -86,5 +86,5 @@ def _type(hint: Any) -> click.ParamType[Any]:
     limits: dict[type[Limit], Any] = {type(each): each.bound for each in parts[1:]} if origin is Annotated else {}
     if (parts[0] if limits else hint) is int:
         most = limits.get(Le, limits[Lt] - 1 if Lt in limits else None)
-        return click.IntRange(limits.get(Ge), most)
+        return click.IntRange(limits.get(Ge), most) if limits else click.INT
     return Finite(limits.get(Ge), limits.get(Le))
