@@ -23,17 +23,22 @@ from .scene.model import Scene
 
 @with_default_errors
 def load(path: StrPath, camera: str | None = None) -> Scene:
-    """Load the scene in a .toml file or a bare model (.glb .gltf .obj .ply .stl .off). camera: the name of one of the
-    file's cameras to use, or for a bare model "front", "right", "back" or "left". Raises SceneError, which lists all
-    problems."""
+    """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (.glb .gltf .obj .ply .stl .off).
+
+    camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left".
+    Raises SceneError, which lists all problems.
+    """
     return _load(path, camera)
 
 
 @with_default_errors
 def render(scene: Scene | StrPath, *, spp: int | None = None, time: float | None = None, error: float | None = None,
            reference: NDArray[np.float32] | None = None, denoise: bool = False, **options: Any) -> Image:
-    """Render a scene, or the scene in a file, until a stop condition: see `Renderer.passes` for these and `Renderer`
-    for `options`. denoise: see docs/denoise.md; the image keeps its `raw` pixels. Raises subclasses of ClrtError."""
+    """Render a scene, or the scene in a file, until `spp`, `time` or `error` is reached.
+
+    These and `reference` are as in `Renderer.passes`, the `options` those of `Renderer`. denoise: see docs/denoise.md;
+    the image keeps its `raw` pixels. Raises subclasses of ClrtError.
+    """
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)
     renderer = Renderer(scene, spp=planned_spp(scene.render, spp, time, error), first_hits=denoise, **options)

@@ -44,16 +44,16 @@ from .thread_turns import ThreadTurns
 class Renderer:
     """Progressive renderer of a scene on one or more devices. Options that are not given are taken from `scene.render`.
 
-    device: see `clrt devices`, or an open device; several render one image together. size: (width, height); triangle,
-    box, sphere: see `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: planned
-    samples per pixel: the sampler makes neighbouring pixels' errors differ at this count and starts afresh after it
-    (kernels/sampler); `passes` stops there. adaptive: more samples for tiles of larger error. on_phase is called with
-    "build" (packing, BVH build) and "compile" (program build, upload) as each begins. checkpoint: a file updated while
-    rendering, about every `checkpoint_seconds` and at the end; resume: continue from it if it exists, with the `spp`
-    planned then (docs/checkpoints.md). error_percentile: a target error counts as reached once this percentage of the 8
-    x 8 pixel tiles has reached it. before: a renderer no longer needed; its device resources are reused as far as its
-    scene consists of the same objects, unmodified. aovs: names of AOVs to render as well (docs/aovs.md). first_hits:
-    whether denoiser guides or first-hit AOVs will be requested later. Raises subclasses of ClrtError.
+    - device: see `clrt devices`, or an open device; several render one image together. size: (width, height).
+    - spp: planned samples per pixel, where `passes` stops. adaptive: more samples for tiles of larger error.
+    - error_percentile: a target error counts as reached once this percentage of the 8 x 8 pixel tiles has reached it.
+    - triangle, box, sphere, offset, builder, layout, tree, lanes, paths: as in `clrt render --help`.
+    - aovs: names of AOVs, see docs/aovs.md; first_hits: whether guides or first-hit AOVs will be requested later.
+    - checkpoint: a file updated about every `checkpoint_seconds` and at the end; resume: continue from it if it exists,
+      with the `spp` planned then (docs/checkpoints.md).
+    - on_phase: called with "build" (packing, BVH build) and "compile" (program build, upload) as each begins.
+    - before: a renderer no longer needed, whose device resources are reused as far as its scene consists of the same
+      objects, unmodified. Raises subclasses of ClrtError.
     """
 
     @with_default_errors

@@ -52,8 +52,10 @@ class DirectionalLight:
 
 @dataclass(frozen=True, kw_only=True)
 class SpotLight:
-    """Spot light: `intensity` W/sr in a cone of `inner_degrees` around `direction`, falling to zero at `outer_degrees`
-    as in glTF's KHR_lights_punctual. `range`: as PointLight's."""
+    """Spot light of `intensity` W/sr in a cone around `direction`.
+
+    It falls from `inner_degrees` to zero at `outer_degrees` as in glTF's KHR_lights_punctual. `range`: as PointLight's.
+    """
 
     kernel: ClassVar[str] = "spot"
     position: tuple[float, float, float]
