@@ -23,7 +23,7 @@ HOUSE = Path(__file__).parents[1]
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the pages that docs/make_reference.py writes."""
     folder = tmp_path_factory.mktemp("reference")
-    command = [sys.executable, HOUSE / "docs" / "make_reference.py", folder]
+    command = [sys.executable, str(HOUSE / "docs" / "make_reference.py"), str(folder)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0 and not done.stderr, done.stderr
     return folder
