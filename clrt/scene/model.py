@@ -32,9 +32,12 @@ Projection = Literal["perspective", "orthographic", "equirectangular"]
 class Camera:
     """Camera. `look_at` is at the image center; the image's right is cross(forward, up).
 
-    perspective: pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
-    `look_at`); `fov_degrees`: vertical, full angle. orthographic: parallel rays, an image `view_height` high (None: as
-    the perspective view at `look_at`). equirectangular: all directions, in Environment's mapping for a view along +Z.
+    projection:
+
+    - "perspective": pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
+      `look_at`); `fov_degrees`: vertical, full angle.
+    - "orthographic": parallel rays, an image `view_height` high (None: as the perspective view at `look_at`).
+    - "equirectangular": all directions, in Environment's mapping for a view along +Z.
     """
 
     position: Vector = (0.0, 0.0, 5.0)
@@ -54,12 +57,14 @@ class Camera:
 class Mesh:
     """Triangle mesh with one material.
 
-    vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; lists and arrays of other
-    dtypes are converted. normals: (n, 3) float32, interpolated over each face, or None for flat shading.
-    uv, uv1: (n, 2) float32, the two sets of texture coordinates (scene.textures). colors: (n, 3) or (n, 4) float32,
-    linear, from 0 to 1; they multiply the material's color, and the fourth component its opacity unless that is 1.
-    tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing.
-    material_name: the material's name in the model file.
+    - vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front. Lists and arrays of other
+      dtypes are converted.
+    - normals: (n, 3) float32, interpolated over each face, or None for flat shading.
+    - uv, uv1: (n, 2) float32, the two sets of texture coordinates (see `Texture`).
+    - colors: (n, 3) or (n, 4) float32, linear, from 0 to 1; they multiply the material's color, and the fourth
+      component its opacity unless that is 1.
+    - tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing.
+    - material_name: the material's name in the model file.
     """
 
     vertices: FloatArray
@@ -174,11 +179,12 @@ class Source:
 
 @dataclass(eq=False, kw_only=True)
 class Scene:
-    """Everything needed to render an image. `camera` is rendered; `cameras`: others by name, including those of model
-    files; `animation`: how the camera moves (scene.animation).
+    """Everything needed to render an image.
 
-    materials: the scene file's named ones; meshes and spheres refer to these objects. source: the files that its parts
-    were read from, if any.
+    - camera: the one to render; cameras: others by name, including those of model files.
+    - animation: how the camera moves.
+    - materials: the scene file's named ones; meshes and spheres refer to these objects.
+    - source: the files that its parts were read from, if any.
     """
 
     meshes: list[Mesh] = field(default_factory=list)

@@ -18,8 +18,13 @@ from clrt.errors import UsageError
 from clrt.rendering.checkpoint.policy import CheckpointPolicy
 from clrt.rendering.compile.choices import Choices
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.renderer_options import (CheckpointOptions, PictureOptions, RendererOptions, TracingOptions,
-                                             checkpoints_of)
+from clrt.rendering.renderer_options import (
+    CheckpointOptions,
+    PictureOptions,
+    RendererOptions,
+    TracingOptions,
+    checkpoints_of,
+)
 from clrt.scene.model import RenderSettings, Scene
 
 #: Fields of settings objects that are not keywords: `tests` is made of HitTests, `direct_light` follows from the AOVs.
