@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ClrtError
 from .animation import Animation
+from .cameras import Camera as Camera
 from .lights import Light
 from .materials.material import Culling, tuples_for_lists
 from .materials.material_types import Diffuse, Material
@@ -25,32 +26,9 @@ FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]
 Pixels = Annotated[int, Ge(1), Le(65536)]
-Projection = Literal["perspective", "orthographic", "equirectangular"]
 Integrator = Literal["path", "direct", "local", "raster", "normals", "albedo", "depth"]
 Sampler = Literal["sobol", "stratified", "independent"]
 Filter = Literal["box", "tent", "blackman_harris", "gaussian"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Camera:
-    """Camera. `look_at` is at the image center; the image's right is cross(forward, up).
-
-    perspective: pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
-    `look_at`); `fov_degrees`: vertical, full angle. orthographic: parallel rays, an image `view_height` high (None: as
-    the perspective view at `look_at`). equirectangular: all directions, in Environment's mapping for a view along +Z.
-    """
-
-    position: Vector = (0.0, 0.0, 5.0)
-    look_at: Vector = (0.0, 0.0, 0.0)
-    up: Vector = (0.0, 1.0, 0.0)
-    fov_degrees: Annotated[float, Gt(0), Lt(180)] = 40.0
-    aperture_radius: NonNegative = 0.0
-    focus_distance: Positive | None = None
-    projection: Projection = "perspective"
-    view_height: Positive | None = None
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
 
 
 @dataclass(eq=False)
