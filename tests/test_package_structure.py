@@ -15,7 +15,7 @@ KERNELS = sorted((HOUSE / "kernels").rglob("*.cl"))
 LONGEST = 300
 
 #: In order: a room imports only from itself and those before it. `clrt` itself is the public names alone.
-ROOMS = ["errors", "threads", "awake", "float_errors", "file_mode", "file_names", "scene", "formats",
+ROOMS = ["errors", "threads", "awake", "float_errors", "file_mode", "file_names", "aov_types", "scene", "formats",
          "device", "accel", "queries", "trimesh", "rendering", "check", "output", "bench", "debug", "api", "live",
          "window", "farm", "clrt", "cli", "__main__"]
 KNOW_OPENCL = {"device", "accel", "queries", "rendering"}

@@ -6,7 +6,7 @@
 // all values are 0 and the primitive is -1. World frame.
 //
 // SEEN_FILES are the files of the materials, if a requested AOV depends on them. To add an AOV: add a function
-// seen_NAME here, and its name in clrt/rendering/accumulation/first_hits.py.
+// seen_NAME here, with the same value in x, y and z if it has one channel, and its entry in clrt/aov_types.py.
 #include "integrator/camera_rays.cl"
 #include "film/film.cl"
 #include VISIBILITY
