@@ -16,7 +16,7 @@ from .options import Size
 
 if TYPE_CHECKING:
     from ..bench.convergence.converge import Effort
-    from ..scene.model import Integrator
+    from ..scene.render_settings import Integrator
 
 #: The configurations of contestants.py, where the names start with "clrt, ".
 NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "paths in lanes",

@@ -33,7 +33,7 @@ SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling",
 @picture_options
 @tracing_options
 def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: str | None, as_json: bool,
-            camera: str | None, depth: int | None, pixel_filter: str | None, lanes: int | None, **given: Any) -> None:
+            camera: str | None, depth: int | None, pixel_filter: str | None, **given: Any) -> None:
     """Show the light paths of one pixel of SCENE, and why it is black or where its light comes from. With the options
     of a render, the samples are exactly those of that render."""
     if click.get_current_context().obj == PROGRAM:
@@ -51,7 +51,7 @@ def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: st
     chosen = {"max_depth": depth, "filter": pixel_filter, **{name: given.pop(name) for name in SETTINGS}}
     content.render = settings = replace(content.render, **{k: v for k, v in chosen.items() if v is not None})
     pixel = pixel or (settings.size[0] // 2, settings.size[1] // 2)
-    paths = trace_pixel(content, open_device(device), pixel, _choices(**given), lanes)
+    paths = trace_pixel(content, open_device(device), pixel, _choices(**given))
     names = SceneNames(content, paths.compiled)
     found = summary(paths, names)
     listed = [(i, paths.values[i].tolist(), list(vertices(paths, names, i))) for i in range(min(samples, settings.spp))]

@@ -13,8 +13,7 @@ from .logs import verbose_option
 from .options import Finite
 
 if TYPE_CHECKING:
-    from ..device.discovery.device_info import Verdict
-    from ..device.discovery.device_info import DeviceInfo
+    from ..device.discovery.device_info import DeviceInfo, Verdict
 
 
 @click.command()

@@ -38,7 +38,6 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
     from ..output.json_text import json_text
     from ..rendering.accumulation.first_hits import first_hit_program
     from ..rendering.aovs import chosen_aovs, seen_first
-    from ..rendering.compile.choices import choices_on
     from ..rendering.compile.compile_scene import compile_scene
     from ..rendering.renderer_options import choices_of
     from .scene_lists import light_texts, lights_in, material_texts, materials_in
@@ -46,9 +45,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
     choices = choices_of({**chosen, "aovs": names})
-    device = _device(selector)
-    choices = choices_on(device, choices, chosen["lanes"]) if device else choices
-    compiled = compile_scene(content, choices, device=device)
+    compiled = compile_scene(content, choices, device=_device(selector))
     built = compiled.tree
     film = prod(content.render.size) * compiled.choices.pixel.itemsize
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}

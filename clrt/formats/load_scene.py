@@ -21,7 +21,6 @@ from .models import FORMATS, SUFFIXES, read_model
 from .referenced_files import check_file, name_of
 from .toml.reader import SceneReader, camera_problems
 
-
 log = logging.getLogger(__name__)
 #: Stands for a TOML scene on standard input; its file names are relative to the working directory.
 STDIN = Path("-")

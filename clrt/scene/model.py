@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,20 +15,17 @@ from ..errors import ClrtError
 from .animation import Animation
 from .cameras import Camera as Camera
 from .lights import Light
-from .materials.material import Culling, tuples_for_lists
 from .materials.material_types import Diffuse, Material
 from .materials.textures import NonNegative
-from .validation.limits import Ge, Gt, Le, Lt
+from .render_settings import RenderSettings as RenderSettings
+from .validation.limits import Gt
 from .validation.number_arrays import real_array, whole_array
+from .validation.tuples import tuples_for_lists
 
 Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]
-Pixels = Annotated[int, Ge(1), Le(65536)]
-Integrator = Literal["path", "direct", "local", "raster", "normals", "albedo", "depth"]
-Sampler = Literal["sobol", "stratified", "independent"]
-Filter = Literal["box", "tent", "blackman_harris", "gaussian"]
 
 
 @dataclass(eq=False)
@@ -151,31 +148,6 @@ class Source:
     def file_of(self, content: object) -> Path | None:
         """Return the file that this very picture or image object was read from."""
         return next((path for each, path in self.files if each is content), None)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RenderSettings:
-    """Default render settings of a scene. `size`: (width, height). `max_depth`: maximum path depth, 1 = emission only,
-    2 = direct light, 3 = one bounce. shadows: whether the local and raster integrators cast them. back_face_culling:
-    which rays ignore the back faces of materials that are not double_sided: "none", those of the "camera", or "all".
-    clamp_direct, clamp_indirect: upper limits per channel of one contribution to a sample, for paths of at most two
-    edges and for longer ones, in the path and direct integrators; 0 does not clamp."""
-
-    size: tuple[Pixels, Pixels] = (512, 512)
-    spp: Annotated[int, Ge(1)] = 64
-    max_depth: Annotated[int, Ge(1), Le(1024)] = 8
-    seed: Annotated[int, Ge(0), Lt(2**32)] = 0
-    integrator: Integrator = "path"
-    shadows: bool = True
-    sampler: Sampler = "sobol"
-    filter: Filter = "box"
-    adaptive: bool = False
-    back_face_culling: Culling = "none"
-    clamp_direct: NonNegative = 0.0
-    clamp_indirect: NonNegative = 0.0
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
 
 
 @dataclass(eq=False, kw_only=True)

@@ -18,8 +18,8 @@ from clrt.scene.geometry.transform import rotation, scaling, transform_mesh, tra
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.materials.material_types import Diffuse, Material
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere, Vector
-from ..scene.shapes import icosphere
 
+from ..scene.shapes import icosphere
 from .draws import DRAWERS, Draws, random_material
 from .vectors import Doubles
 

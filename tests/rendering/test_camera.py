@@ -20,8 +20,8 @@ from clrt.device.open import Device
 from clrt.device.programs import program
 from clrt.rendering.accumulation.denoiser_guides import render_guides
 from clrt.rendering.compile.compile_scene import compile_scene
-from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.cameras import CAMERA_TYPES, Perspective, Projection
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 
 from ..covering import others

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...scene.cameras import CAMERA_TYPES, Projection
 from ...scene.geometry.transform import rotation, scaling, transform_mesh, translation
-from ...scene.lights import LIGHTS, Light, SpotLight
+from ...scene.lights import LIGHTS, Light, SpotLight, fields_of
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
 from ...scene.model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere, Vector
 from ..rays.shapes import icosphere
@@ -89,9 +89,10 @@ class _Stage:
         height, strength = draws.between(3.4 if draws.moderate else 2.0, 4.4), draws.decades(-0.5, 1.0)
         red, green, blue = (strength * part for part in draws.vector(0.2, 1.0))
         towards = draws.between(-0.8, 0.8) - x, -height, draws.between(-0.8, 0.8) - z
-        light = draws.record(kind, **_known(kind, {
+        light = draws.record(kind, **fields_of(kind, {
             "position": (x, height, z), "direction": towards, "irradiance": (red, green, blue),
-            "intensity": (9 * red, 9 * green, 9 * blue)}))
+            "intensity": (9 * red, 9 * green, 9 * blue), "radius": 0.1 * height,
+            "radiance": (30 * red, 30 * green, 30 * blue)}))
         if isinstance(light, SpotLight) and light.inner_degrees >= light.outer_degrees:
             return replace(light, inner_degrees=0.9 * light.outer_degrees)
         return light
@@ -191,11 +192,6 @@ class _Stage:
                      fov_degrees=draws.between(30, 55), aperture_radius=radius if lens else 0.0,
                      focus_distance=focus if lens else None, view_height=None)
         return draws.record(Camera, **Camera(projection=projection).unread_fields() | given)
-
-
-def _known(kind: Any, values: dict[str, Any]) -> dict[str, Any]:
-    """Return those of the values that are fields of a dataclass."""
-    return {each.name: values[each.name] for each in fields(kind) if each.name in values}
 
 
 def _product(*matrices: Any) -> Any:

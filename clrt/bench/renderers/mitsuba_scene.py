@@ -8,7 +8,7 @@ Materials are converted in mitsuba_bsdfs.py.
 from __future__ import annotations
 
 from math import cos, radians, tan
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,15 +127,19 @@ def _distance(camera: Camera) -> float:
 
 
 def _light(light: Light, camera: Camera) -> Plugin:
-    if not isinstance(light, DirectionalLight) and light.range is not None:
+    if isinstance(light, PointLight | SpotLight) and light.range is not None:
         raise UsageError("light: ranges are not exported to Mitsuba")
-    if isinstance(light, PointLight):
-        return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
-    if isinstance(light, SpotLight):
-        return _spot(light)
-    if light.angle_degrees:
-        return _sun(light, camera)
-    return {"type": "directional", "direction": list(light.direction), "irradiance": rgb(light.irradiance)}
+    match light:
+        case PointLight():
+            return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
+        case SpotLight():
+            return _spot(light)
+        case DirectionalLight() if light.angle_degrees:
+            return _sun(light, camera)
+        case DirectionalLight():
+            return {"type": "directional", "direction": list(light.direction), "irradiance": rgb(light.irradiance)}
+        case _:
+            assert_never(light)
 
 
 def _sun(light: DirectionalLight, camera: Camera) -> Plugin:

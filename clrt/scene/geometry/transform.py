@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lights import DirectionalLight, Light, PointLight
+from ..lights import Light
 from ..model import Camera, Mesh, Vector
 
 Matrix = NDArray[np.float64]
@@ -88,16 +89,15 @@ def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
 
 
 def transform_light(light: Light, matrix: Matrix) -> Light:
-    """Return the light under an affine `matrix`, moved and rotated; its strength and range are kept, as in glTF."""
-    turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    if not isinstance(light, PointLight):
-        x, y, z = unit(matrix[:3, :3] @ light.direction).tolist()
-        turned = x, y, z
-        if isinstance(light, DirectionalLight):
-            return replace(light, direction=turned)
-    x, y, z = (matrix[:3] @ [*light.position, 1.0]).tolist()
-    moved = replace(light, position=(x, y, z))
-    return moved if isinstance(moved, PointLight) else replace(moved, direction=turned)
+    """Return the light under an affine `matrix`, moved and rotated; its size, strength and range are kept, as in glTF.
+    """
+    changed: dict[str, Any] = {}
+    for name, value in vars(light).items():
+        if name == "position":
+            changed[name] = tuple((matrix[:3] @ [*value, 1.0]).tolist())
+        elif name == "direction":
+            changed[name] = tuple(unit(matrix[:3, :3] @ value).tolist())
+    return replace(light, **changed)
 
 
 def transform_faults(to_world: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:

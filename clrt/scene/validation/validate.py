@@ -12,7 +12,7 @@ from ...errors import SceneError, UsageError
 from ..animation import Animation
 from ..camera_path import animation_problems
 from ..geometry.instancing import painted
-from ..lights import LIGHTS, PointLight, SpotLight
+from ..lights import LIGHTS
 from ..materials.material_types import MATERIALS, Diffuse, Material
 from ..model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere
 from .field_types import field_problems, show
@@ -263,11 +263,5 @@ def _environment_problems(environment: Environment) -> list[str]:
 def _light_problems(light: object, where: str) -> list[str]:
     if not isinstance(light, LIGHTS):
         return [f"{where}: {show(light)} is not a light; write a {' or '.join(kind.__name__ for kind in LIGHTS)}"]
-    if problems := _object_problems(light, type(light), where):
-        return problems
-    if not isinstance(light, PointLight) and not any(light.direction):
-        problems.append(f"{where}.direction: [0, 0, 0] is not a direction; write the one the light travels in")
-    if isinstance(light, SpotLight) and light.inner_degrees >= light.outer_degrees:
-        problems.append(f"{where}.inner_degrees: {light.inner_degrees:g} is not below outer_degrees, "
-                        f"{light.outer_degrees:g}; write a smaller angle")
-    return problems
+    problems = _object_problems(light, type(light), where)
+    return problems or [f"{where}.{conflict}" for conflict in light.conflicts()]
