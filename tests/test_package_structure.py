@@ -12,9 +12,9 @@ HOUSE = Path(__file__).parents[1]
 SOURCES = sorted((HOUSE / "clrt").rglob("*.py"))
 
 #: In order: a room imports only from itself and those before it. `clrt` itself is the public names alone.
-ROOMS = ["errors", "option_fields", "threads", "awake", "float_errors", "file_mode", "file_names", "scene", "formats",
-         "device", "accel", "queries", "trimesh", "rendering", "check", "output", "bench", "debug", "api", "live",
-         "window", "farm", "clrt", "cli", "__main__"]
+ROOMS = ["errors", "option_fields", "threads", "awake", "float_errors", "file_mode", "file_names", "aov_types", "scene",
+         "formats", "device", "accel", "queries", "trimesh", "rendering", "check", "output", "bench", "debug", "api",
+         "live", "window", "farm", "clrt", "cli", "__main__"]
 KNOW_OPENCL = {"device", "accel", "queries", "rendering"}
 #: Beyond the order: trees know nothing of scenes, and pictures are written without any device.
 NEVER = {"accel": {"scene"}, "output": {"device", "accel", "queries", "trimesh", "rendering"}}

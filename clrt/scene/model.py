@@ -6,18 +6,19 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ClrtError
 from .animation import Animation
+from .cameras import Camera as Camera
 from .lights import Light
 from .materials.material_types import Diffuse, Material
 from .materials.textures import NonNegative
 from .render_settings import RenderSettings as RenderSettings
-from .validation.limits import Gt, Lt
+from .validation.limits import Gt
 from .validation.number_arrays import real_array, whole_array
 from .validation.tuples import tuples_for_lists
 
@@ -25,32 +26,6 @@ Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]
-Projection = Literal["perspective", "orthographic", "equirectangular"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Camera:
-    """Camera. `look_at` is at the image center; the image's right is cross(forward, up).
-
-    projection:
-
-    - "perspective": pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
-      `look_at`); `fov_degrees`: vertical, full angle.
-    - "orthographic": parallel rays, an image `view_height` high (None: as the perspective view at `look_at`).
-    - "equirectangular": all directions, in Environment's mapping for a view along +Z.
-    """
-
-    position: Vector = (0.0, 0.0, 5.0)
-    look_at: Vector = (0.0, 0.0, 0.0)
-    up: Vector = (0.0, 1.0, 0.0)
-    fov_degrees: Annotated[float, Gt(0), Lt(180)] = 40.0
-    aperture_radius: NonNegative = 0.0
-    focus_distance: Positive | None = None
-    projection: Projection = "perspective"
-    view_height: Positive | None = None
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
 
 
 @dataclass(eq=False)

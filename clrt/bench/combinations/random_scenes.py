@@ -1,8 +1,8 @@
 """Random scenes that cover the registries: materials, lights, cameras, textures, with all optional fields.
 
 Some objects and instances stand on a floor below a few lights. Scenes of a batch (see Draws) have the same kinds of
-objects and lights, with different positions and intensities. Additions to MATERIALS and LIGHTS, and new fields of
-these, of Texture, Camera and RenderSettings, need no change here.
+objects and lights, with different positions and intensities. Additions to MATERIALS, LIGHTS and CAMERA_TYPES, and new
+fields of these, of Texture, Camera and RenderSettings, need no change here.
 """
 
 from __future__ import annotations
@@ -13,21 +13,11 @@ from typing import Any, get_args
 
 import numpy as np
 
+from ...scene.cameras import CAMERA_TYPES, Projection
 from ...scene.geometry.transform import rotation, scaling, transform_mesh, translation
 from ...scene.lights import LIGHTS, Light, SpotLight, fields_of
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
-from ...scene.model import (
-    Camera,
-    Environment,
-    FloatArray,
-    Instance,
-    Mesh,
-    Projection,
-    RenderSettings,
-    Scene,
-    Sphere,
-    Vector,
-)
+from ...scene.model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere, Vector
 from ..rays.shapes import icosphere
 from .random_draws import Draws
 
@@ -192,15 +182,16 @@ class _Stage:
     def _camera(self) -> Camera:
         draws = self.draws
         projection = draws.one_of(("perspective", "perspective", "perspective", *get_args(Projection)))
-        far = draws.between(1.4, 2.2) if projection == "equirectangular" else draws.between(4.0, 6.0)
+        far = draws.between(1.4, 2.2) if CAMERA_TYPES[projection].all_around else draws.between(4.0, 6.0)
         turn, elevation = draws.between(-pi, pi), draws.between(0.25, 1.0)
         x, y, z = far * sin(turn) * cos(elevation), far * sin(elevation), far * cos(turn) * cos(elevation)
         lens = projection == "perspective" and draws.chance(0.25)
         radius, focus = draws.between(0.02, 0.15), draws.between(3.0, 6.0)
-        return draws.record(Camera, projection=projection, position=(x, y, z),
-                            look_at=(draws.between(-0.4, 0.4), 0.5, draws.between(-0.4, 0.4)), up=(0.1, 1.0, 0.0),
-                            fov_degrees=draws.between(30, 55), aperture_radius=radius if lens else 0.0,
-                            focus_distance=focus if lens else None, view_height=None)
+        given = dict(projection=projection, position=(x, y, z),
+                     look_at=(draws.between(-0.4, 0.4), 0.5, draws.between(-0.4, 0.4)), up=(0.1, 1.0, 0.0),
+                     fov_degrees=draws.between(30, 55), aperture_radius=radius if lens else 0.0,
+                     focus_distance=focus if lens else None, view_height=None)
+        return draws.record(Camera, **Camera(projection=projection).unread_fields() | given)
 
 
 def _product(*matrices: Any) -> Any:

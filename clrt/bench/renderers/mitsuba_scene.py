@@ -59,8 +59,8 @@ def _sensor(scene: Scene, sampler: str) -> Plugin:
     distance = _distance(camera)
     to_world = _frame(camera.position, np.subtract(camera.look_at, camera.position), camera.up)
     lens: Plugin = {"type": "perspective", "fov": camera.fov_degrees, "fov_axis": "y"}
-    if camera.projection == "equirectangular":
-        raise UsageError(f"{scene.name}: Mitsuba has no equirectangular camera")
+    if camera.projection not in ("perspective", "orthographic"):
+        raise UsageError(f"{scene.name}: Mitsuba has no {camera.projection} camera")
     if camera.projection == "orthographic":
         tall = camera.view_height or 2 * distance * tan(radians(camera.fov_degrees) / 2)
         lens = {"type": "orthographic"}    # x from -1 to 1

@@ -119,9 +119,8 @@ def _instances(instances: list[Instance], frame: SceneFrame) -> list[Instance]:
 
 def camera_in(camera: Camera, frame: SceneFrame) -> Camera:
     """Return a camera in a frame."""
-    focus, height = (length and length * frame.unit for length in (camera.focus_distance, camera.view_height))
-    return replace(camera, position=frame.point(camera.position), look_at=frame.point(camera.look_at),
-                   aperture_radius=camera.aperture_radius * frame.unit, focus_distance=focus, view_height=height)
+    return replace(camera.scaled(frame.unit), position=frame.point(camera.position),
+                   look_at=frame.point(camera.look_at))
 
 
 def _sphere(sphere: Sphere, frame: SceneFrame) -> Sphere:

@@ -85,9 +85,7 @@ def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
     corners = np.array([[*camera.position, 1], [*camera.look_at, 1], [*camera.up, 0]]) @ matrix.T
     position, look_at, up = corners[:, :3].tolist()
     stretch = float(np.linalg.norm(up) / np.linalg.norm(camera.up))
-    focus, height = (length and length * stretch for length in (camera.focus_distance, camera.view_height))
-    return replace(camera, position=position, look_at=look_at, up=up, focus_distance=focus, view_height=height,
-                   aperture_radius=camera.aperture_radius * stretch)
+    return replace(camera.scaled(stretch), position=position, look_at=look_at, up=up)
 
 
 def transform_light(light: Light, matrix: Matrix) -> Light:

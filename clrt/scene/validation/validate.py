@@ -225,11 +225,8 @@ def _camera_problems(camera: Camera) -> list[str]:
     right = np.cross(forward / np.abs(forward).max(), up / np.abs(up).max())
     if np.linalg.norm(right) < 1e-6:
         return [f"camera.up: {show(camera.up)} is parallel to the view direction; write another, such as [0, 0, -1]"]
-    given = {"aperture_radius": camera.aperture_radius or None, "focus_distance": camera.focus_distance,
-             "view_height": camera.view_height}
-    return [f'camera.{name}: {show(value)} has no effect with projection = "{camera.projection}"; leave it out'
-            for name, value in given.items() if value is not None
-            and camera.projection != ("orthographic" if name == "view_height" else "perspective")]
+    return [f'camera.{name}: {show(getattr(camera, name))} has no effect with projection = "{camera.projection}"; '
+            'leave it out' for name, default in camera.unread_fields().items() if getattr(camera, name) != default]
 
 
 def _raster_problems(scene: Scene) -> list[str]:
