@@ -66,6 +66,7 @@ def describe_class(page: pdoc.doc.Class) -> None:
         elif isinstance(member, pdoc.doc.Variable) and isinstance(attribute, property):
             vars(member)["annotation_str"] = f": {Written(attribute.fget.__annotations__['return'])}"
     vars(page)["own_members"] = members
+    vars(page)["decorators"] = [each for each in page.decorators if not each.startswith("@listed")]
     vars(page)["docstring"] = "\n\n".join([page.docstring, *(inspect.cleandoc(base.__doc__ or "") for base in bases)])
 
 
