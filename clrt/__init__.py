@@ -16,9 +16,15 @@ if TYPE_CHECKING:
     from . import trimesh
     from .api import animate as animate, load as load, render as render
     from .device.discovery.discover import devices as devices
-    from .errors import (CheckpointError as CheckpointError, ClrtError as ClrtError, DeviceError as DeviceError,
-                         KernelError as KernelError, OutputError as OutputError, SceneError as SceneError,
-                         UsageError as UsageError)
+    from .errors import (
+        CheckpointError as CheckpointError,
+        ClrtError as ClrtError,
+        DeviceError as DeviceError,
+        KernelError as KernelError,
+        OutputError as OutputError,
+        SceneError as SceneError,
+        UsageError as UsageError,
+    )
     from .output.image import Image as Image
     from .output.image_error import compare as compare
     from .output.images import read_image as read_image
@@ -27,15 +33,26 @@ if TYPE_CHECKING:
     from .rendering.renderer import Renderer as Renderer, State as State
     from .scene.animation import Animation as Animation, Keyframe as Keyframe
     from .scene.camera_path import frames as frames, turntable as turntable
-    from .scene.lights import (DirectionalLight as DirectionalLight, PointLight as PointLight,
-                               SpotLight as SpotLight)
-    from .scene.materials.material_types import (BlinnPhong as BlinnPhong, Conductor as Conductor,
-                                                 Dielectric as Dielectric, Diffuse as Diffuse,
-                                                 MetallicRoughness as MetallicRoughness, Mirror as Mirror,
-                                                 Phong as Phong)
+    from .scene.lights import DirectionalLight as DirectionalLight, PointLight as PointLight, SpotLight as SpotLight
+    from .scene.materials.material_types import (
+        BlinnPhong as BlinnPhong,
+        Conductor as Conductor,
+        Dielectric as Dielectric,
+        Diffuse as Diffuse,
+        MetallicRoughness as MetallicRoughness,
+        Mirror as Mirror,
+        Phong as Phong,
+    )
     from .scene.materials.textures import Picture as Picture, Texture as Texture
-    from .scene.model import (Camera as Camera, Environment as Environment, Instance as Instance, Mesh as Mesh,
-                              RenderSettings as RenderSettings, Scene as Scene, Sphere as Sphere)
+    from .scene.model import (
+        Camera as Camera,
+        Environment as Environment,
+        Instance as Instance,
+        Mesh as Mesh,
+        RenderSettings as RenderSettings,
+        Scene as Scene,
+        Sphere as Sphere,
+    )
     __version__: str
 
 _HOME = {

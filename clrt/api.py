@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,10 @@ from .formats.load_scene import load as _load
 from .output.data_images import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
+from .rendering.listed_keywords import listed
 from .rendering.render_report import render_report
 from .rendering.renderer import Renderer
+from .rendering.renderer_options import SETTINGS, RendererOptions
 from .rendering.stop_conditions import planned_spp
 from .scene.camera_path import frames as _frames
 from .scene.model import Scene
@@ -31,23 +33,24 @@ def load(path: StrPath, camera: str | None = None) -> Scene:
     return _load(path, camera)
 
 
+@listed(RendererOptions, SETTINGS)
 @with_default_errors
-def render(scene: Scene | StrPath, *, spp: int | None = None, time: float | None = None, error: float | None = None,
-           reference: NDArray[np.float32] | None = None, denoise: bool = False, **options: Any) -> Image:
-    """Render a scene, or the scene in a file, until `spp`, `time` or `error` is reached.
-
-    These and `reference` are as in `Renderer.passes`, the `options` those of `Renderer`. denoise: see docs/denoise.md;
-    the image keeps its `raw` pixels. Raises subclasses of ClrtError.
+def render(scene: Scene | StrPath, *, time: float | None = None, error: float | None = None,
+           reference: NDArray[np.float32] | None = None, denoise: bool = False,
+           **options: Unpack[RendererOptions]) -> Image:
+    """Render a scene, or the scene in a file, until a stop condition: see `Renderer.passes` for spp, time, error and
+    reference. denoise: see docs/denoise.md; the image keeps its `raw` pixels. Raises subclasses of ClrtError.
     """
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)
-    renderer = Renderer(scene, spp=planned_spp(scene.render, spp, time, error), first_hits=denoise, **options)
-    return _rendered(renderer, denoiser, reference, spp=spp, time=time, error=error)
+    stops = Stops(options.get("spp"), time, error)
+    return _rendered(_renderer(scene, stops, denoise, options), denoiser, reference, stops)
 
 
-def animate(scene: Scene | StrPath, *, frames: Iterable[int] | None = None, spp: int | None = None,
-            time: float | None = None, error: float | None = None, denoise: bool = False,
-            **options: Any) -> Iterator[tuple[int, Image]]:
+@listed(RendererOptions, SETTINGS)
+def animate(scene: Scene | StrPath, *, frames: Iterable[int] | None = None, time: float | None = None,
+            error: float | None = None, denoise: bool = False,
+            **options: Unpack[RendererOptions]) -> Iterator[tuple[int, Image]]:
     """Render a scene with camera animation, all `frames` or the given numbers; yields each frame's number and image.
 
     The other arguments are as in `render`, per frame. Raises SceneError if the scene has no animation, and subclasses
@@ -55,23 +58,37 @@ def animate(scene: Scene | StrPath, *, frames: Iterable[int] | None = None, spp:
     """
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)
-    renderer = None
+    renderer, stops = None, Stops(options.get("spp"), time, error)
     for number, still in _frames(scene, frames):
         if renderer is None:
-            renderer = Renderer(still, spp=planned_spp(still.render, spp, time, error), first_hits=denoise, **options)
+            renderer = _renderer(still, stops, denoise, options)
         else:
             renderer.look(still.camera)
-        yield number, _rendered(renderer, denoiser, None, spp=spp, time=time, error=error)
+        yield number, _rendered(renderer, denoiser, None, stops)
+
+
+class Stops(NamedTuple):
+    """Stop conditions of a render."""
+
+    spp: int | None
+    time: float | None
+    error: float | None
+
+
+def _renderer(scene: Scene, stops: Stops, denoise: bool, options: RendererOptions) -> Renderer:
+    options["spp"] = planned_spp(scene.render, *stops)
+    options["first_hits"] = denoise or options.get("first_hits", False)
+    return Renderer(scene, **options)
 
 
 @with_default_errors
 def _rendered(renderer: Renderer, denoiser: Denoiser | None, reference: NDArray[np.float32] | None,
-              **stops: Any) -> Image:
+              stops: Stops) -> Image:
     if denoiser:
         check_denoisable(renderer.settings.integrator)
     guides = renderer.session.guides() if denoiser else {}
     state = None
-    for state in renderer.passes(reference=reference, **stops):
+    for state in renderer.passes(reference=reference, **stops._asdict()):
         pass
     assert state is not None  # passes() yields at least once
     renderer.warnings.log(state.film)

@@ -10,10 +10,20 @@ import imageio.v3 as imageio
 import numpy as np
 
 from clrt.output.images import write_image
+
 from .formats.glb import Gltf, ball
 from .formats.test_gltf import cameras, compressed
-from .formats.test_meshes import (obj, obj_with_normals, off, ply_ascii, ply_big_endian, ply_binary, ply_with_normals,
-                                  stl_ascii, stl_binary)
+from .formats.test_meshes import (
+    obj,
+    obj_with_normals,
+    off,
+    ply_ascii,
+    ply_big_endian,
+    ply_binary,
+    ply_with_normals,
+    stl_ascii,
+    stl_binary,
+)
 from .fuzz import FORMATS, LARGEST, OBJ
 from .scene.shapes import icosphere
 

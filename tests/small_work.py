@@ -20,6 +20,7 @@ from clrt.output.aov_files import layered
 from clrt.queries.base import TRAVERSALS
 from clrt.rendering.accumulation.denoiser_guides import render_guides
 from clrt.rendering.accumulation.first_hits import first_hits
+from clrt.rendering.accumulation.launch_plan import LaunchPlan
 from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.aovs import AOVS, film_aovs
 from clrt.rendering.compile.choices import OFFSETS
@@ -53,7 +54,7 @@ def scene() -> Scene:
 def started(device: Device, what: Scene, **chosen: Any) -> SingleDeviceAccumulation:
     """Return a session ready to render the scene. chosen: see Choices."""
     compiled = compile_scene(what, choices(device, **chosen), device=device)
-    return SingleDeviceAccumulation(device, compiled, what.render.size, what.render.max_depth, what.render.seed)
+    return SingleDeviceAccumulation(device, compiled, LaunchPlan.of(what.render, None))
 
 
 def picture(device: Device, what: Scene, **chosen: Any) -> Answers:

@@ -32,7 +32,8 @@ from clrt.scene.editing import materials_of, with_material
 from clrt.scene.lights import PointLight
 from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from clrt.scene.materials.presets import Preset
-from clrt.scene.model import Integrator, Scene, Sphere
+from clrt.scene.model import Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 GROWTH = 1.05
 SIZE = (192, 144)

@@ -12,6 +12,7 @@ import pytest
 from clrt.output.images import write_image
 from clrt.scene.lights import PointLight
 from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
+
 from .references import load_reference
 
 RECORD: dict[str, Any] = {

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .bvh import BoolArray, FloatArray, Bvh
+from .bvh import BoolArray, Bvh, FloatArray
 from .top_down import OpenNodes, grow
 
 Doubles = NDArray[np.float64]

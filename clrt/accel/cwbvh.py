@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .bvh import BoolArray, FloatArray, IntArray, Bvh
+from .bvh import BoolArray, Bvh, FloatArray, IntArray
 from .wide import EMPTY, WideBvh, collapse, leaf_fields
 
 Bytes = NDArray[np.uint8]

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from ..errors import check_choice
 from .builders import BUILDERS
-from .bvh import FloatArray, IntArray, Bvh, join
+from .bvh import Bvh, FloatArray, IntArray, join
 from .cwbvh import MAX_LEAF, compress
 from .grouping import packs_of
 from .wide import WideBvh, collapse, leaf_fields, leaf_reference

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .bvh import BoolArray, FloatArray, IntArray, Bvh, empty_tree
+from .bvh import BoolArray, Bvh, FloatArray, IntArray, empty_tree
 
 #: From this level on, nodes are split at the median of their order, so that depth <= MAX_FREE_DEPTH + ceil(log2 p).
 MAX_FREE_DEPTH = 40

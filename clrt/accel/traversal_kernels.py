@@ -2,48 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, get_args
 
-from ..errors import check_choice
 from .build import DEVICE_BUILDERS
 from .builders import BUILDERS
 from .layouts import NO_RAYS, PACK, Layout
+from .methods import HitTests as HitTests, TriangleTest
 
 #: Traversal files by layout, and the number of triangles per record.
 TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "cwbvh": ("traverse/cwbvh.cl", 1),
          "list": ("traverse/list.cl", 1), "packs": ("traverse/packs.cl", PACK)}
-#: Brute-force layouts, whose cost per ray grows linearly with the number of primitives.
-TREELESS = ("packs", "list")
 #: Traversal files for instances, by layout.
 UPPER_LEVELS = {"bvh8": "traverse/instance.cl", "bvh2": "traverse/slab_instance.cl",
                 "cwbvh": "traverse/slab_instance.cl"}
 #: Builders by name.
 BUILDER_NAMES = [*DEVICE_BUILDERS, *BUILDERS]
-TRIANGLE_TESTS = {name: f"geometry/triangle_{name}.cl"
-                  for name in ("watertight", "moller_trumbore", "precomputed", "baldwin_weber")}
+TRIANGLE_TESTS = {name: f"geometry/triangle_{name}.cl" for name in get_args(TriangleTest)}
 #: The only triangle test of the layout packs.
 PACKS_TEST = "geometry/triangle_watertight_packs.cl"
 BOX_TESTS = {"robust": "geometry/box_robust.cl", "plain": "geometry/box_plain.cl"}
 SPHERE_TESTS = {"robust": "geometry/sphere.cl", "textbook": "geometry/sphere_textbook.cl"}
 RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles", "leaf_spheres": "LeafSphere",
            "instances": "Instance", "visits": "Visits"}
-
-
-@dataclass(frozen=True)
-class HitTests:
-    """Intersection tests: names in TRIANGLE_TESTS, BOX_TESTS and SPHERE_TESTS. Raises UsageError for others.
-
-    Tests that are not watertight or robust are for comparison: they lose hits or digits, as their files document.
-    """
-
-    triangle: str = "watertight"
-    box: str = "robust"
-    sphere: str = "robust"
-
-    def __post_init__(self) -> None:
-        for (name, value), known in zip(asdict(self).items(), (TRIANGLE_TESTS, BOX_TESTS, SPHERE_TESTS)):
-            check_choice(name, value, known)
 
 
 def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:

@@ -100,7 +100,8 @@ class TwoLevelBvh:
             put(device, buffers["nodes"], nodes, node)
             if form.leaves in tree.buffers:
                 put(device, buffers[form.leaves], tree.buffers[form.leaves], leaf)
-        buffers |= {"leaf_spheres": tree.buffers["leaf_spheres"] for tree in trees if "leaf_spheres" in tree.buffers}
+            if "leaf_spheres" in tree.buffers:
+                buffers["leaf_spheres"] = tree.buffers["leaf_spheres"]
         buffers["instances"] = room_for(device, INSTANCE, len(self._mesh))
         return buffers, first_node[:-1]
 

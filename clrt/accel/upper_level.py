@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .builders import BUILDERS
-from .bvh import FloatArray, IntArray, Bvh
+from .bvh import Bvh, FloatArray, IntArray
 from .cwbvh import CWBVH_NODE, compress
 from .layouts import BVH2_NODE, BVH8_NODE, LANES, Layout, Records, bvh2_nodes, wide_nodes
 from .wide import EMPTY, collapse, leaf_fields

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .bvh import BoolArray, FloatArray, IntArray, Bvh, expected_work, half_area, intersections
+from .bvh import BoolArray, Bvh, FloatArray, IntArray, expected_work, half_area, intersections
 
 #: Child reference of an unused slot; used slots come first.
 EMPTY = 0x7FFFFFFF

@@ -6,13 +6,12 @@ import json
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from queue import Empty, SimpleQueue
 from typing import IO, Any
 
 from ..awake import AwakeClock
-from ..device.discovery.device_info import Verdict
-from ..device.discovery.device_info import DeviceInfo
+from ..device.discovery.device_info import DeviceInfo, Verdict
 from ..device.programs.child_process import end_child, last_line, start_child, told_end
 from ..device.programs.kernel_files import kernel_digest
 from ..errors import DeviceError
@@ -48,7 +47,7 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
             failures.append(f"{part}: it did not finish in {limit:g} s")
         finally:
             end_child(child)
-    when = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    when = datetime.now(UTC).isoformat(timespec="seconds")
     return Verdict(not failures, failures, when, round(clock.seconds, 1), kernels, figures)
 
 

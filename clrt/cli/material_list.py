@@ -10,8 +10,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from ..scene.materials.material import SHARED
 from ..scene.materials.material_types import MATERIALS, Material
-from ..scene.materials.presets import F0_PRESETS
-from ..scene.materials.presets import CONDUCTORS
+from ..scene.materials.presets import CONDUCTORS, F0_PRESETS
 from ..scene.materials.textures import Texture
 from ..scene.validation.field_types import show
 from ..scene.validation.limits import Ge, Gt, Le, Lt

@@ -121,7 +121,7 @@ class JsonProgress(Progress):
 
 
 def _tell_json(values: dict[str, Any]) -> None:
-    from ..output.json_text import json_text     # imports numpy, which is being loaded in another thread
+    from ..output.json_text import json_text  # imports numpy, which is being loaded in another thread
 
     tell(json_text(values))
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rendering.compile.compile_scene import CompiledScene
-from ..rendering.compile.lights.pack_lights import TYPES, light_type
+from ..rendering.compile.lights.light_types import TYPES
+from ..rendering.compile.lights.pack_lights import lights_of
 from ..scene.model import Instance, Mesh, Scene, Sphere
 from ..scene.provenance import material_of
 
@@ -58,8 +59,9 @@ class SceneNames:
             return self.object(self._object_of(int(self._compiled.counts["triangles"][0]) + sphere))
         if kind == "sky":
             return "the environment"
-        entry = [i for i, light in enumerate(self._scene.lights) if light_type(light) == kind][index]
-        return f"light[{entry}] ({self._scene.lights[entry].kernel})"
+        light = lights_of(self._scene, kind)[index]
+        entry = next(i for i, each in enumerate(self._scene.lights) if each is light)
+        return f"light[{entry}] ({light.kernel})"
 
     def _object_of(self, primitive: int) -> int:
         """Return the object of a primitive that does not belong to an instance; primitives of instances come first."""

@@ -14,9 +14,9 @@ from ..device.open import Device
 from ..device.programs.program import make_kernel
 from ..errors import UsageError
 from ..rendering.accumulation.checked_loops import check_paths
-from ..rendering.accumulation.launch_plan import depth_of, first_launch, first_launch_samples
+from ..rendering.accumulation.launch_plan import LaunchPlan, first_launch_samples
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
-from ..rendering.compile.choices import Choices, choices_on
+from ..rendering.compile.choices import Choices
 from ..rendering.compile.compile_scene import DEBUG, CompiledScene, compile_scene
 from ..rendering.compile.features import WITH_LIGHT
 from ..rendering.error_estimate.adaptive_sampling import most_planned
@@ -67,21 +67,19 @@ class PixelPaths:
         return np.diff(np.append(self.starts, len(self.rows)))
 
 
-def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: Choices = Choices(),
-                lanes: int | None = None) -> PixelPaths:
+def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: Choices = Choices()) -> PixelPaths:
     """Trace all `scene.render.spp` samples of the pixel (column, row), counted from the upper left corner, exactly as a
     render with the scene's settings does.
 
-    choices, lanes: see `Renderer`. Raises UsageError if the pixel is outside the image, or the integrator does not
-    trace paths; SceneError, DeviceError and KernelError like a render.
+    Raises UsageError if the pixel is outside the image, or the integrator does not trace paths; SceneError, DeviceError
+    and KernelError like a render.
     """
     settings = scene.render
     _check(settings, pixel)
-    compiled = compile_scene(scene, choices_on(device, choices, lanes), DEBUG, device)
+    compiled = compile_scene(scene, choices, DEBUG, device)
     compiled = replace(compiled, preamble=f"{compiled.preamble}\n{vertex_preamble()}")
-    depth = depth_of(settings)
-    planned = most_planned(settings.spp, settings.adaptive)
-    launch = first_launch(compiled, settings.size, depth, settings.seed, planned)
+    plan = LaunchPlan.of(settings, most_planned(settings.spp, settings.adaptive))
+    launch, depth = plan.record(compiled), plan.max_depth
     launch["first_pixel"] = pixel[1] * settings.size[0] + pixel[0]
     batch = min(settings.spp, max(1, min(first_launch_samples(compiled), MOST_RECORDS // depth)))
     on_device = SceneOnDevice(device, compiled, launch, batch * depth * VERTEX.itemsize)

@@ -11,7 +11,7 @@ from ..output.denoise import Denoiser, denoised
 from ..output.image import Image
 from ..rendering.accumulation.accumulation import Accumulation
 from ..rendering.accumulation.device_pool import DevicePool
-from ..rendering.accumulation.launch_plan import depth_of
+from ..rendering.accumulation.launch_plan import LaunchPlan
 from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_pool
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
 from ..rendering.film.tiles import TILE, tiles_of
@@ -19,7 +19,6 @@ from ..rendering.render_report import render_report
 from ..rendering.renderer import Renderer
 from ..rendering.stop_conditions import planned_spp
 from .orders import PictureOrder
-
 
 #: The renderer of the last order: frames and bands of one scene share its BVH and program.
 _kept: dict[str, Renderer] = {}
@@ -34,14 +33,13 @@ class BandRenderer(Renderer):
     def show(self, band: tuple[int, int]) -> None:
         """Start with tile rows first … end − 1."""
         self._band = band
-        self.session = self._make_picture()
+        self._progress.session = self._make_picture()
         self._begin()
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
-        settings, (first, end) = self.settings, self._band
-        (width, height), columns = settings.size, tiles_of(settings.size)[1]
-        self._pool = self._pool or make_pool(self.devices, self._compiled, settings.size, depth_of(settings),
-                                             settings.seed, self._planned_spp)
+        plan, (first, end) = LaunchPlan.of(self.settings, self._planned_spp), self._band
+        (width, height), columns = plan.size, tiles_of(plan.size)[1]
+        self._pool = self._pool or make_pool(self.devices, self._compiled, plan)
         return MultiDeviceAccumulation(self._pool, (width, min(end * TILE, height) - first * TILE), first * columns)
 
 

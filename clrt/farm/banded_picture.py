@@ -138,7 +138,7 @@ class BandedPicture:
     def _facts(self) -> dict[str, str]:
         """Return the facts that identify the render, including its stopping criteria, as each band stops by itself."""
         order = self.order
-        others = {"band_pixels": self.band_pixels, **beyond(order.options, order.scene.render),
+        others = {"band_pixels": self.band_pixels, **beyond(order.options),
                   **{each.name: getattr(order, each.name) for each in fields(order) if each.name not in COMMON}}
         return {**facts_of(order.settled, order.choices),
                 **{name: str(value) for name, value in others.items() if name != "device"}}

@@ -17,7 +17,7 @@ from uuid import uuid4
 from ..awake import watched_clock
 from ..errors import ClrtError, DeviceError, HungError, SceneError
 from .cluster import Cluster, Result
-from .worker_states import BadResult, WorkerState, RunningTask, TaskSource, Task
+from .worker_states import BadResult, RunningTask, Task, TaskSource, WorkerState
 
 #: Minimum seconds between two queries of the workers, also as a multiple of a query's duration; and the wait for
 #: results.

@@ -34,7 +34,7 @@ from .orders import Order
 from .serialization import pack
 from .worker_check import WorkerCheck
 from .worker_request import ask
-from .worker_states import BadResult, WorkerState, Task
+from .worker_states import BadResult, Task, WorkerState
 from .worker_tasks import draw, identity, prepare, render_share
 
 #: Target seconds per task with few workers; with many, more, so that client and scheduler handle at most

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Unpack, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from ..errors import DeviceError, UsageError
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
 from ..rendering.render_warnings import PictureWarnings
 from ..rendering.renderer import Renderer, State
+from ..rendering.renderer_options import RendererOptions
 from ..scene.model import Camera, Scene
 from ..scene.validation.validate import validate
 from .cluster import Cluster
@@ -30,10 +31,8 @@ class FarmRenderer(Renderer):
     simulated: samples per second of workers that only sleep, to measure the overhead (simulated.py).
     """
 
-    session: FarmAccumulation
-
     def __init__(self, scene: Scene, cluster: Cluster, *, simulated: float | None = None,
-                 **options: Any) -> None:
+                 **options: Unpack[RendererOptions]) -> None:
         self._cluster, self._simulated = cluster, simulated
         super().__init__(scene, **options)
 
@@ -43,24 +42,21 @@ class FarmRenderer(Renderer):
         try:
             yield from super().passes(spp=spp, time=time, error=error, reference=reference)
         except DeviceError:
-            self._keep(last=True)
+            self._progress.save(last=True)
             if self._checkpoints is not None:
                 self._checkpoints.wait()
             raise
 
-    def _open(self, device: Selectors, lanes: int | None, on_phase: Callable[[str], None],
-              before: Renderer | None) -> None:
+    def _open(self, device: Selectors, on_phase: Callable[[str], None], before: Renderer | None) -> None:
         validate(self.scene)
         given = [device] if device is None or isinstance(device, str | int | Device) else list(device)
         selectors = tuple(each for each in given if isinstance(each, str | int))
         if len(selectors) < len(given) - (given == [None]):
             raise UsageError("a farm renders on its workers' devices; give their names instead of opened devices")
-        self.devices = []
-        self._lanes, self._selectors = lanes, selectors
+        self.devices, self._selectors = [], selectors
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> FarmAccumulation:
-        order = Order(self.scene, self.choices, self._lanes, self._planned_spp, self._selectors,
-                      self._simulated)
+        order = Order(self.scene, self.choices, self._planned_spp, self._selectors, self._simulated)
         picture = FarmAccumulation(self._cluster, order, self.choices.pixel)
         facts = picture.dispatch.wait_for()[0].facts or {}
         self.warnings = PictureWarnings(self.scene, facts["report"]["kernel"]["features"])
@@ -69,9 +65,14 @@ class FarmRenderer(Renderer):
     def _turn_to(self, camera: Camera) -> None:
         """Start a new image. Many images are better rendered by one worker each (whole_pictures.py)."""
         self.scene = replace(self.scene, camera=camera)
-        self.session = self._make_picture()
+        self._progress.session = self._make_picture()
+
+    @property
+    def session(self) -> FarmAccumulation:
+        """The samples of the image, on this client."""
+        return cast(FarmAccumulation, super().session)
 
     @property
     def name(self) -> str:
         """Return the names of all devices that render."""
-        return (self.session.told("name") if hasattr(self, "session") else "") or FARM
+        return (self.session.told("name") if hasattr(self, "_progress") else "") or FARM

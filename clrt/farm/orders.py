@@ -14,13 +14,13 @@ from ..scene.model import Camera, Scene
 class Order:
     """A scene to prepare for rendering shares of its image.
 
-    asked, lanes: see `choices_on`; planned_spp: see `session.block_bits`; devices: selectors of a worker's devices,
-    none for its best one; simulated: samples per second of a worker that only sleeps (simulated.py).
+    choices: resolved by each worker for its devices; planned_spp: see `launch_plan.block_bits`; devices: selectors of a
+    worker's devices, none for its best one; simulated: samples per second of a worker that only sleeps
+    (simulated_workers.py).
     """
 
     scene: Scene
-    asked: Choices
-    lanes: int | None
+    choices: Choices
     planned_spp: int | None
     devices: tuple[str | int, ...] = ()
     simulated: float | None = None

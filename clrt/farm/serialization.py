@@ -26,7 +26,7 @@ LARGE = 1 << 14
 #: Placeholder for the client's file paths, which have no meaning elsewhere: they arrive as None.
 HERE = "a file"
 #: Classes that a pickle may name: the dataclasses of these modules, and single names.
-ROOMS = ("clrt.scene.", "clrt.accel.traversal_kernels", "clrt.rendering.compile.choices", "clrt.farm.orders")
+ROOMS = ("clrt.scene.", "clrt.accel.methods", "clrt.rendering.compile.choices", "clrt.farm.orders")
 NAMES = {("numpy", "ndarray"), ("numpy", "dtype"), ("collections", "OrderedDict"), ("builtins", "complex"),
          *((f"numpy.{core}", name) for core in ("core.multiarray", "_core.multiarray")
            for name in ("_reconstruct", "scalar")),

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rendering.accumulation.launch_plan import depth_of
+from ..rendering.accumulation.launch_plan import LaunchPlan
 from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_pool
 from ..rendering.accumulation.work_queue import WorkPart, WorkQueue
-from ..rendering.compile.choices import choices_on
 from ..rendering.compile.scene_compiler import SceneCompiler
 from ..rendering.film.tiles import TILE_PIXELS, scattered
 from .orders import Order
@@ -30,9 +29,8 @@ class ShareRenderer:
         self.scene, self.selectors = order.scene, order.devices
         settings = order.scene.render
         devices = opened(order.devices)
-        compiled = SceneCompiler(devices).compile(order.scene,
-                                                  [choices_on(each, order.asked, order.lanes) for each in devices])
-        self._pool = make_pool(devices, compiled, settings.size, depth_of(settings), settings.seed, order.planned_spp)
+        compiled = SceneCompiler(devices).compile(order.scene, order.choices)
+        self._pool = make_pool(devices, compiled, LaunchPlan.of(settings, order.planned_spp))
         # Its film uses no memory while it is empty.
         self._picture = MultiDeviceAccumulation(self._pool, settings.size)
         self._pixel = compiled[0].choices.pixel

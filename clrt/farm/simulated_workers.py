@@ -29,7 +29,7 @@ class Simulation:
 
     def __init__(self, order: Order) -> None:
         assert order.simulated is not None
-        self._speed, self._pixel = order.simulated, order.asked.pixel
+        self._speed, self._pixel = order.simulated, order.choices.pixel
 
     def share(self, tiles: NDArray[np.uint32], first: int, more: int, pixels: NDArray[Any] | None) -> NDArray[Any]:
         """Return the pixels with `more` more samples, all black, after the time that those would take."""

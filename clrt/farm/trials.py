@@ -107,7 +107,7 @@ def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
 
 def overhead(scene: Scene, workers: int, seconds: float) -> Row:
     """Measure simulated workers: parallel efficiency, data moved, and CPU time of client and scheduler."""
-    import psutil    # a dependency of Dask
+    import psutil  # a dependency of Dask
 
     width, height = scene.render.size
     spp = int(workers * SPEED * seconds / (width * height))

@@ -16,7 +16,7 @@ from .cluster import Cluster
 from .dispatch import Dispatch
 from .orders import PictureOrder
 from .serialization import Serialized, pack
-from .worker_states import BadResult, WorkerState, Task
+from .worker_states import BadResult, Task, WorkerState
 from .worker_tasks import identity, introduce, render_whole
 
 #: With more images than this left per worker, each worker has the next one queued.

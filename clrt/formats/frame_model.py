@@ -24,9 +24,10 @@ FILL = 0.92
 ROUNDS = 20
 
 Doubles = NDArray[np.float64]
+IDENTITY: Matrix = np.eye(4)
 
 
-def frame(meshes: list[Mesh], instances: Sequence[Instance] = (), turn: Matrix = np.eye(4)) -> Camera:
+def frame(meshes: list[Mesh], instances: Sequence[Instance] = (), turn: Matrix = IDENTITY) -> Camera:
     """Return the nearest three-quarter view that has every vertex inside a square image, with the model centered.
 
     Only vertices that faces use count; instances count by the corners of their mesh's bounding box. The model fills

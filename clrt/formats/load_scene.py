@@ -17,16 +17,15 @@ from ..scene.model import Scene
 from ..scene.provenance import source_of_model
 from ..scene.validation.validate import scene_problems
 from .frame_model import VIEWS, frame
-from .models import SUFFIXES, read_model
+from .models import FORMATS, SUFFIXES, read_model
 from .referenced_files import check_file, name_of
 from .toml.reader import SceneReader, camera_problems
-
 
 log = logging.getLogger(__name__)
 #: Stands for a TOML scene on standard input; its file names are relative to the working directory.
 STDIN = Path("-")
-#: Formats of CAD and 3D printing, where +Z is up and −Y the front, and how bare models of these are rotated.
-Z_UP, UPRIGHT = (".stl",), (-90.0, 0.0, 0.0)
+#: How bare models are rotated if +Z is up in their format and −Y the front.
+UPRIGHT = (-90.0, 0.0, 0.0)
 
 
 def load(path: StrPath, camera: str | None = None) -> Scene:
@@ -70,7 +69,7 @@ def _load_model(path: Path, view: str | None) -> Scene:
     """
     model = read_model(path)
     placing: dict[str, Any] = {}
-    if path.suffix.lower() in Z_UP:
+    if FORMATS[path.suffix.lower()].z_up:
         placing = {"rotate_degrees": UPRIGHT}
         model.meshes = [transform_mesh(mesh, rotation(UPRIGHT)) for mesh in model.meshes]
     angle = None if view is None or view in model.cameras else VIEWS.get(view)
@@ -107,4 +106,5 @@ def _load_mitsuba(path: Path) -> tuple[Scene, list[str]]:
     return scene, []
 
 
+#: Readers of scene files by suffix; those of models are in models.FORMATS.
 _READERS = {".toml": _load_toml, ".xml": _load_mitsuba}

@@ -1,5 +1,7 @@
 """Model file reading. STL, OFF and uncommon PLY files use trimesh's parsers; other readers are our own.
 
+To add a format: write its reader, and its entry in FORMATS, where the scene file, `load` and the command line find it.
+
 The parsers are called directly, since a trimesh.Trimesh does not say whether the file had normals. They pass on NaN
 and invalid indices and raise arbitrary exceptions, so all they return is validated here.
 """
@@ -7,8 +9,9 @@ and invalid indices and raise arbitrary exceptions, so all they return is valida
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +29,6 @@ from .referenced_files import check_file, name_of
 
 log = logging.getLogger(__name__)
 
-SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
-
 
 def read_mesh(path: StrPath, normals: Normals = "file") -> list[Mesh]:
     """Return the meshes of a model file, as `read_model` reads them, with its instances as further ones."""
@@ -42,45 +43,83 @@ def read_model(path: StrPath, normals: Normals = "file") -> Model:
     index or vertex that is wrong.
     """
     path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
+    format = FORMATS.get(path.suffix.lower())
+    if format is None:
         raise SceneError(f"{path}: a model must be one of {', '.join(SUFFIXES)}; convert it")
     check_file(path, "model")
-    if suffix in (".glb", ".gltf"):
-        from .gltf.reader import read_gltf
-        return read_gltf(path, normals)
-    try:
-        return Model(meshes=_meshes(_parse(path, suffix), name_of(path), normals))
-    except SceneError as error:
-        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+    return format.read(path, normals)
 
 
-def _parse(path: Path, suffix: str) -> dict[str, Any]:
-    """Parse the file into the keyword arguments of trimesh's own classes."""
+def _gltf(path: Path, normals: Normals) -> Model:
+    from .gltf.reader import read_gltf
+    return read_gltf(path, normals)
+
+
+def _obj(path: Path) -> dict[str, Any]:
+    from .wavefront.obj import parse_obj
+    return {"geometry": parse_obj(path)}
+
+
+def _ply(path: Path) -> dict[str, Any]:
+    if plain := plain_ply(path):
+        return plain
+    from trimesh.exchange.ply import load_ply
+    with path.open("rb") as file:
+        parts: dict[str, Any] = load_ply(file, skip_materials=True)
+    return parts
+
+
+def _stl(path: Path) -> dict[str, Any]:
+    from trimesh.exchange.stl import load_stl
+    with path.open("rb") as file:
+        parts: dict[str, Any] = load_stl(file)
+    return parts
+
+
+def _off(path: Path) -> dict[str, Any]:
+    from trimesh.exchange.off import load_off
+    with path.open("rb") as file:
+        parts: dict[str, Any] = load_off(file)
+    return parts
+
+
+def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals], Model]:
+    """Return a reader from a parser, which returns the keyword arguments of trimesh's classes for one mesh (vertices,
+    faces, vertex_normals, uv, vertex_colors), or for several by name in `geometry`; it may raise anything."""
+    def read(path: Path, normals: Normals) -> Model:
+        try:
+            return Model(meshes=_meshes(_parsed(parse, path), name_of(path), normals))
+        except SceneError as error:
+            raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+    return read
+
+
+class ModelFormat(NamedTuple):
+    """Format of model files. read: its reader, which raises SceneError naming the file; z_up: whether +Z is up and −Y
+    the front, as in CAD and 3D printing."""
+
+    read: Callable[[Path, Normals], Model]
+    z_up: bool = False
+
+
+#: Model formats by suffix.
+FORMATS = {".glb": ModelFormat(_gltf), ".gltf": ModelFormat(_gltf), ".obj": ModelFormat(of_parts(_obj)),
+           ".ply": ModelFormat(of_parts(_ply)), ".stl": ModelFormat(of_parts(_stl), z_up=True),
+           ".off": ModelFormat(of_parts(_off))}
+SUFFIXES = tuple(FORMATS)
+
+
+def _parsed(parse: Callable[[Path], dict[str, Any]], path: Path) -> dict[str, Any]:
     try:
-        with np.errstate(all="ignore"), path.open("rb") as file:
-            parts: dict[str, Any]
-            if suffix == ".obj":
-                from .wavefront.obj import parse_obj
-                parts = {"geometry": parse_obj(path)}
-            elif suffix == ".ply" and (plain := plain_ply(path)):
-                parts = plain
-            elif suffix == ".ply":
-                from trimesh.exchange.ply import load_ply
-                parts = load_ply(file, skip_materials=True)
-            elif suffix == ".stl":
-                from trimesh.exchange.stl import load_stl
-                parts = load_stl(file)
-            else:
-                from trimesh.exchange.off import load_off
-                parts = load_off(file)
-            return parts
+        with np.errstate(all="ignore"):
+            return parse(path)
     except SceneError:
         raise
     except Exception as error:  # a damaged file may make trimesh's parsers raise anything
         # On undecodable bytes trimesh raises an ImportError about an encoding detector: no help to the user.
         detail = "" if isinstance(error, ImportError) else f" ({type(error).__name__}: {error})"
-        raise SceneError(f"cannot be read as {suffix[1:].upper()}{detail}; export the model again") from error
+        name = path.suffix[1:].upper()
+        raise SceneError(f"cannot be read as {name}{detail}; export the model again") from error
 
 
 def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:

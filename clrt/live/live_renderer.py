@@ -19,7 +19,6 @@ from .image_sizing import ImageSizing
 from .picks import Thing
 from .settings import Selector, Settings
 
-
 #: Maximum fraction of the time spent on denoising before all samples are rendered.
 DENOISING = 0.25
 

@@ -8,7 +8,6 @@ from typing import Any
 
 from ..errors import UsageError
 
-
 Selector = str | int | Sequence[str | int] | None
 #: Settings that are not passed to the renderer, or not by the same name.
 OWN = {"device", "scale", "frame_rate", "samples", "denoise"}

@@ -9,15 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..aov_types import AOV_TYPES
 from .view_transform import to_display
 
 FloatArray = NDArray[np.float32]
 Pictures = Mapping[str, NDArray[np.generic]]
 
-#: Channel names of the AOVs: colors, vectors, distances along the view, numbers.
-CHANNELS = {"albedo": "RGB", "normal": "XYZ", "geometric_normal": "XYZ", "position": "XYZ", "depth": "Z",
-            "primitive": "X", "object": "X", "material": "X", "direct": "RGB", "indirect": "RGB", "variance": "RGB",
-            "samples": "X"}
+#: Channel names of the AOVs.
+CHANNELS = {name: kind.channels for name, kind in AOV_TYPES.items()}
 #: Largest integer up to which float32 represents all integers.
 LARGEST_ID = 1 << 24
 _log = logging.getLogger(__name__)
@@ -42,23 +41,23 @@ def files_beside(path: Path, names: Iterable[str]) -> dict[str, Path]:
 def drawn(name: str, aov: NDArray[np.generic], view: str, exposure: float) -> NDArray[np.uint8]:
     """Return a visualization of an AOV as 8-bit colors (height, width, 3); see docs/aovs.md."""
     values = aov.astype(np.float32).reshape(*aov.shape[:2], -1)
-    match name:
-        case "direct" | "indirect":
+    match AOV_TYPES[name].display:
+        case "light":
             return to_display(values, view, exposure)
-        case "variance":
+        case "error":
             return to_display(np.sqrt(np.nan_to_num(values)), view, exposure)
-        case "albedo":
-            return to_display(values)
-        case "normal" | "geometric_normal":
+        case "color":
+            return to_display(np.broadcast_to(values, (*aov.shape[:2], 3)))
+        case "direction":
             shown = np.where(values.any(axis=2, keepdims=True), 0.5 + 0.5 * values, 0)
         case "position":
             low, high = values.min(axis=(0, 1)), values.max(axis=(0, 1))
             shown = (values - low) / np.where(high > low, high - low, 1)
         case "depth":
             shown = np.where(np.isfinite(values), values.min(), 0) / values
-        case "samples":
+        case "count":
             shown = values / max(values.max(), 1)
-        case _:
+        case "id":
             shown = _colors_of(aov)
     return to_display(np.broadcast_to(shown, (*aov.shape[:2], 3)).astype(np.float32), "raw")
 

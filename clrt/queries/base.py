@@ -13,7 +13,8 @@ import pyopencl as cl
 from numpy.typing import ArrayLike, NDArray
 
 from ..accel.layouts import LANES, Layout
-from ..accel.traversal_kernels import HitTests, tree_buffers, tree_defines, tree_features, tree_files
+from ..accel.methods import HitTests
+from ..accel.traversal_kernels import tree_buffers, tree_defines, tree_features, tree_files
 from ..accel.wide import EMPTY
 from ..device.launches.device_arrays import lent, on_host, resident
 from ..device.launches.driver_loop_limits import loop_turns

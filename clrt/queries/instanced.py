@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..accel.layouts import Layout
-from ..accel.traversal_kernels import HitTests
+from ..accel.methods import HitTests
 from ..accel.two_level import TwoLevelBvh
 from ..device.open import open_device
 from ..errors import SceneError

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..accel.build import build_tree
 from ..accel.layouts import Layout
+from ..accel.methods import HitTests
 from ..accel.refit import Refitter, can_refit
-from ..accel.traversal_kernels import HitTests
 from ..device.open import Device, open_device
 from ..errors import SceneError
 from ..float_errors import with_default_errors

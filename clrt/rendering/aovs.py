@@ -1,4 +1,4 @@
-"""AOVs (arbitrary output variables): which exist, and how they are computed."""
+"""AOVs (arbitrary output variables) of a render: the choice of names, and their computation (see clrt.aov_types)."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from difflib import get_close_matches
 import numpy as np
 from numpy.typing import NDArray
 
+from ..aov_types import AOV_TYPES, aovs_from
 from ..errors import UsageError
 from ..float_errors import with_default_errors
 from ..scene.model import Scene
 from .accumulation.accumulation import Accumulation
-from .accumulation.first_hits import MEANS, OF_THE_MIDDLE
 from .compile.features import WITH_LIGHT
 from .film.film import Film
 
-#: AOVs from the render's film; the first two make it accumulate direct light separately.
+AOVS = tuple(AOV_TYPES)
+#: AOVs that make the film accumulate direct light separately.
 LIGHT = ("direct", "indirect")
-OF_THE_FILM = (*LIGHT, "variance", "samples")
-AOVS = (*MEANS, *OF_THE_MIDDLE, *OF_THE_FILM)
 
 
 class Aovs:
@@ -71,12 +70,12 @@ def check_light(names: Iterable[str], integrator: str) -> None:
 
 def seen_first(names: Iterable[str]) -> tuple[str, ...]:
     """Return the names of the first-hit AOVs among them (`first_hits`)."""
-    return tuple(name for name in names if name in (*MEANS, *OF_THE_MIDDLE))
+    return tuple(name for name in names if name in aovs_from("mean", "center", "hits"))
 
 
 @with_default_errors
 def film_aovs(film: Film, names: Iterable[str]) -> dict[str, NDArray[np.generic]]:
-    """Return the AOVs of OF_THE_FILM in `names`: (height, width, 3) float32, but samples (height, width) uint32.
+    """Return the AOVs from the film in `names`: (height, width, 3) float32, but samples (height, width) uint32.
 
     variance is that of a pixel's mean for independent samples; NaN below two samples.
     """

@@ -1,33 +1,167 @@
-"""Lights without a surface. Area lights are meshes and spheres with an emissive material; see also `Environment`."""
+"""Lights without a surface: plain data, one dataclass each. A light's samples are from `kernels/light/<kernel>.cl`.
+
+To add one: write its kernel file, write its dataclass here and list it in `Light`, where the scene file, the
+validation, the packing, the window and random scenes find it. A name means the same in all types: `position`, the
+`direction` in which the light travels, the STRENGTHS, and what LENGTHS lists. Area lights are meshes and spheres with
+an emissive material; see also `Environment`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import pi, radians, sin
-from typing import Annotated, ClassVar
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from math import pi, radians, sin, sqrt
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args
 
-from .materials.material import Radiance, tuples_for_lists
+import numpy as np
+
+from .materials.material import Radiance
 from .validation.limits import Ge, Gt, Le, Lt
+from .validation.tuples import tuples_for_lists
 
 Length = Annotated[float, Gt(0)]
+Vector = tuple[float, float, float]
+
+#: Fields that say how bright a light is.
+STRENGTHS = ("intensity", "irradiance", "radiance")
+#: Fields that depend on the unit of length, and the power of it that multiplies them: W/sr is W/m² at a distance, times
+#: its square.
+LENGTHS = {"range": 1, "radius": 1, "intensity": 2}
+#: Directional lights of a smaller angle are delta lights: float32 has too few directions inside their disc.
+SMALLEST_DEGREES = 1e-4
+#: Minimum width of a spot's falloff in the cosine, and minimum square of a range: the inverse must fit in float32.
+STEEPEST = 1e-30
+
+
+class Bounds(NamedTuple):
+    """Bounds of a light, at most `radius` from `center`, for light sampling (kernels/light/importance.cl).
+
+    intensity: W/sr where it is brightest. axis: unit, the normal of what emits on one side, or the axis of a cone; None
+    for a light that emits in all directions. height: 1 − the cosine of the cone's angle, None for a hemisphere; the
+    light then has the feature LIGHT_CONES.
+    """
+
+    center: Vector
+    intensity: Radiance
+    radius: float = 0.0
+    axis: Vector | None = None
+    height: float | None = None
+
+
+class DistantBounds(NamedTuple):
+    """Irradiance of an infinitely distant light at a normal n: about radiance·projected·(least + n·towards), or 0.
+
+    towards: unit. projected: the projected solid angle, 1 if `radiance` is an irradiance. least: so large that the sum
+    is 0 only for normals that receive nothing.
+    """
+
+    towards: Vector
+    radiance: Radiance
+    projected: float = 1.0
+    least: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class PointLight:
-    """Point light. `intensity`: W/sr in every direction from `position`. `range`: distance from which it is zero;
-    before, it is reduced by the fraction (distance/range)⁴ (KHR_lights_punctual); None for no limit."""
+class BaseLight:
+    """Base class of lights. kernel: its type in scene files; distant: whether it is infinitely far away."""
 
-    kernel: ClassVar[str] = "point"
-    position: tuple[float, float, float]
-    intensity: Radiance
-    range: Length | None = None
+    kernel: ClassVar[str]
+    distant: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
 
+    @classmethod
+    def kernels(cls) -> tuple[str, ...]:
+        """Return the names of all kernel files that sample lights of this type."""
+        return (cls.kernel,)
+
+    @property
+    def sampled_by(self) -> str:
+        """The name of the kernel file that samples this light, one of `kernels`."""
+        return self.kernel
+
+    def parameters(self) -> dict[str, float | Vector]:
+        """Return the values its kernel file reads: numbers and triples, the same names for all that it samples."""
+        raise NotImplementedError
+
+    def bounds(self) -> Bounds | DistantBounds:
+        """Return its bounds; DistantBounds if it is `distant`."""
+        raise NotImplementedError
+
+    def features(self) -> frozenset[str]:
+        """Return the macros to define, for parts of the kernels that only some lights need."""
+        return frozenset()
+
+    def conflicts(self) -> list[str]:
+        """Return what is wrong with its fields beyond their types: "FIELD: fault; remedy"."""
+        fault = "direction: [0, 0, 0] is not a direction; write the one the light travels in"
+        return [] if any(getattr(self, "direction", (1,))) else [fault]
+
+    @property
+    def is_black(self) -> bool:
+        """Whether it emits nothing."""
+        return not any(any(value) for name, value in vars(self).items() if name in STRENGTHS)
+
+    def in_unit(self: Self, unit: float) -> Self:
+        """Return the light for a scene whose lengths are all multiplied by `unit`; it is not moved."""
+        return replace(self, **{name: _times(value, unit**LENGTHS[name]) for name, value in vars(self).items()
+                                if name in LENGTHS and value is not None})
+
 
 @dataclass(frozen=True, kw_only=True)
-class DirectionalLight:
+class PointLight(BaseLight):
+    """Point light. `intensity`: W/sr in every direction from `position`. `range`: distance from which it is zero;
+    before, it is reduced by the fraction (distance/range)⁴ (KHR_lights_punctual); None for no limit."""
+
+    kernel: ClassVar[str] = "point"
+    position: Vector
+    intensity: Radiance
+    range: Length | None = None
+
+    def parameters(self) -> dict[str, float | Vector]:
+        return {"position": self.position, "intensity": self.intensity, "per_range2": _per_range2(self.range)}
+
+    def bounds(self) -> Bounds:
+        return Bounds(self.position, self.intensity)
+
+    def features(self) -> frozenset[str]:
+        return frozenset({"LIGHT_RANGES"} if self.range else ())
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpotLight(BaseLight):
+    """Spot light: `intensity` W/sr in a cone of `inner_degrees` around `direction`, falling to zero at `outer_degrees`
+    as in glTF's KHR_lights_punctual. `range`: as PointLight's."""
+
+    kernel: ClassVar[str] = "spot"
+    position: Vector
+    direction: Vector
+    intensity: Radiance
+    inner_degrees: Annotated[float, Ge(0), Lt(90)] = 0.0
+    outer_degrees: Annotated[float, Gt(0), Le(90)] = 45.0
+    range: Length | None = None
+
+    def parameters(self) -> dict[str, float | Vector]:
+        inner, outer = one_minus_cos(self.inner_degrees), one_minus_cos(self.outer_degrees)
+        return {"position": self.position, "axis": unit_vector(self.direction), "intensity": self.intensity,
+                "outer": outer, "slope": 1 / max(outer - inner, STEEPEST), "per_range2": _per_range2(self.range)}
+
+    def bounds(self) -> Bounds:
+        return Bounds(self.position, self.intensity, axis=unit_vector(self.direction),
+                      height=one_minus_cos(self.outer_degrees))
+
+    def features(self) -> frozenset[str]:
+        return frozenset({"LIGHT_CONES", "LIGHT_RANGES"} if self.range else {"LIGHT_CONES"})
+
+    def conflicts(self) -> list[str]:
+        fault = (f"inner_degrees: {self.inner_degrees:g} is not below outer_degrees, {self.outer_degrees:g}; write a "
+                 "smaller angle")
+        return super().conflicts() + ([] if self.inner_degrees < self.outer_degrees else [fault])
+
+
+@dataclass(frozen=True, kw_only=True)
+class DirectionalLight(BaseLight):
     """Light from infinitely far away that travels along `direction`; `irradiance`: W/m² on a surface facing it.
 
     angle_degrees: the angular diameter of its disc, which is visible to the camera and in reflections and softens
@@ -35,12 +169,18 @@ class DirectionalLight:
     """
 
     kernel: ClassVar[str] = "directional"
-    direction: tuple[float, float, float]
+    distant: ClassVar[bool] = True
+    direction: Vector
     irradiance: Radiance
     angle_degrees: Annotated[float, Ge(0), Le(180)] = 0.0
 
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
+    @classmethod
+    def kernels(cls) -> tuple[str, ...]:
+        return "directional", "sun"
+
+    @property
+    def sampled_by(self) -> str:
+        return "sun" if self.angle_degrees >= SMALLEST_DEGREES else "directional"
 
     @property
     def radiance(self) -> Radiance:
@@ -49,25 +189,47 @@ class DirectionalLight:
         red, green, blue = (value / solid_angle for value in self.irradiance)
         return red, green, blue
 
+    def parameters(self) -> dict[str, float | Vector]:
+        towards = unit_vector(self.direction, -1)
+        if self.sampled_by == "directional":
+            return {"towards": towards, "irradiance": self.irradiance}
+        return {"towards": towards, "radiance": self.radiance, "height": one_minus_cos(self.angle_degrees / 2)}
 
-@dataclass(frozen=True, kw_only=True)
-class SpotLight:
-    """Spot light of `intensity` W/sr in a cone around `direction`.
-
-    It falls from `inner_degrees` to zero at `outer_degrees` as in glTF's KHR_lights_punctual. `range`: as PointLight's.
-    """
-
-    kernel: ClassVar[str] = "spot"
-    position: tuple[float, float, float]
-    direction: tuple[float, float, float]
-    intensity: Radiance
-    inner_degrees: Annotated[float, Ge(0), Lt(90)] = 0.0
-    outer_degrees: Annotated[float, Gt(0), Le(90)] = 45.0
-    range: Length | None = None
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
+    def bounds(self) -> DistantBounds:
+        """Return an upper bound. The highest point of a disc has elevation h + a, where h is the elevation of its
+        center and a half its angle, and sin(h + a) <= sin h + sin a."""
+        towards = unit_vector(self.direction, -1)
+        if self.sampled_by == "directional":
+            return DistantBounds(towards, self.irradiance)
+        height = float(np.float32(one_minus_cos(self.angle_degrees / 2)))    # the disc that the kernel samples
+        sine2 = height * (2 - height)
+        return DistantBounds(towards, self.radiance, pi * sine2, sqrt(sine2))
 
 
+#: Every type of light.
 Light = PointLight | SpotLight | DirectionalLight
-LIGHTS: tuple[type[Light], ...] = (PointLight, SpotLight, DirectionalLight)
+LIGHTS: tuple[type[Light], ...] = get_args(Light)
+
+
+def fields_of(kind: type[Light], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of the values, by name, that are fields of a type of light."""
+    return {field.name: values[field.name] for field in fields(kind) if field.name in values}
+
+
+def unit_vector(direction: Vector, sign: float = 1) -> Vector:
+    """Return the unit vector along a direction, or against it for a sign of −1."""
+    x, y, z = (sign * np.asarray(direction) / np.linalg.norm(direction)).tolist()
+    return x, y, z
+
+
+def one_minus_cos(degrees: float) -> float:
+    """Return 1 − cos x as 2 sin² (x/2), which is accurate for small angles."""
+    return float(2 * np.sin(np.radians(degrees) / 2) ** 2)
+
+
+def _per_range2(reach: float | None) -> float:
+    return 0.0 if reach is None else 1 / max(reach**2, STEEPEST)
+
+
+def _times(value: Any, factor: float) -> Any:
+    return tuple(factor * part for part in value) if isinstance(value, tuple) else factor * value

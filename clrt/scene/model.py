@@ -6,54 +6,26 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ClrtError
 from .animation import Animation
+from .cameras import Camera as Camera
 from .lights import Light
-from .materials.material import Culling, tuples_for_lists
 from .materials.material_types import Diffuse, Material
 from .materials.textures import NonNegative
-from .validation.limits import Ge, Gt, Le, Lt
+from .render_settings import RenderSettings as RenderSettings
+from .validation.limits import Gt
 from .validation.number_arrays import real_array, whole_array
+from .validation.tuples import tuples_for_lists
 
 Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]
-Pixels = Annotated[int, Ge(1), Le(65536)]
-Projection = Literal["perspective", "orthographic", "equirectangular"]
-Integrator = Literal["path", "direct", "local", "raster", "normals", "albedo", "depth"]
-Sampler = Literal["sobol", "stratified", "independent"]
-Filter = Literal["box", "tent", "blackman_harris", "gaussian"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Camera:
-    """Camera. `look_at` is at the image center; the image's right is cross(forward, up).
-
-    projection:
-
-    - "perspective": pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
-      `look_at`); `fov_degrees`: vertical, full angle.
-    - "orthographic": parallel rays, an image `view_height` high (None: as the perspective view at `look_at`).
-    - "equirectangular": all directions, in Environment's mapping for a view along +Z.
-    """
-
-    position: Vector = (0.0, 0.0, 5.0)
-    look_at: Vector = (0.0, 0.0, 0.0)
-    up: Vector = (0.0, 1.0, 0.0)
-    fov_degrees: Annotated[float, Gt(0), Lt(180)] = 40.0
-    aperture_radius: NonNegative = 0.0
-    focus_distance: Positive | None = None
-    projection: Projection = "perspective"
-    view_height: Positive | None = None
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
 
 
 @dataclass(eq=False)
@@ -178,31 +150,6 @@ class Source:
     def file_of(self, content: object) -> Path | None:
         """Return the file that this very picture or image object was read from."""
         return next((path for each, path in self.files if each is content), None)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RenderSettings:
-    """Default render settings of a scene. `size`: (width, height). `max_depth`: maximum path depth, 1 = emission only,
-    2 = direct light, 3 = one bounce. shadows: whether the local and raster integrators cast them. back_face_culling:
-    which rays ignore the back faces of materials that are not double_sided: "none", those of the "camera", or "all".
-    clamp_direct, clamp_indirect: upper limits per channel of one contribution to a sample, for paths of at most two
-    edges and for longer ones, in the path and direct integrators; 0 does not clamp."""
-
-    size: tuple[Pixels, Pixels] = (512, 512)
-    spp: Annotated[int, Ge(1)] = 64
-    max_depth: Annotated[int, Ge(1), Le(1024)] = 8
-    seed: Annotated[int, Ge(0), Lt(2**32)] = 0
-    integrator: Integrator = "path"
-    shadows: bool = True
-    sampler: Sampler = "sobol"
-    filter: Filter = "box"
-    adaptive: bool = False
-    back_face_culling: Culling = "none"
-    clamp_direct: NonNegative = 0.0
-    clamp_indirect: NonNegative = 0.0
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
 
 
 @dataclass(eq=False, kw_only=True)

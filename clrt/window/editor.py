@@ -23,10 +23,8 @@ from ..output.atomic_files import check_unprotected
 from ..output.images import write_image
 from ..output.scenes import save_scene
 from ..scene.editing import materials_of, with_material
-from ..scene.lights import DirectionalLight
 from ..scene.materials.material import Material
-from ..scene.model import Camera, Instance, Scene, Sphere
-from ..scene.model import Source
+from ..scene.model import Camera, Instance, Scene, Source, Sphere
 from .camera_controls import CameraControls
 from .navigation import around, distance
 from .screenshot import screenshot
@@ -209,9 +207,11 @@ class Editor:
         if self.moving_light is None or self.moving_light >= len(lights):
             return
         light = lights[self.moving_light]
-        if not isinstance(light, DirectionalLight):
+        position = getattr(light, "position", None)
+        if position is not None:
             turn = tau * imgui.get_io().delta_time / ROUND
-            lights[self.moving_light] = replace(light, position=around(light.position, self.scene.camera, turn))
+            moved: dict[str, Any] = {"position": around(position, self.scene.camera, turn)}
+            lights[self.moving_light] = replace(light, **moved)
             self.attempt(lambda: self.live.edit(replace(self.scene, lights=lights), moving=True, step=False))
 
 

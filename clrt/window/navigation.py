@@ -6,7 +6,7 @@ Rotations are about the camera's `up` and its own right; they stop short of look
 from __future__ import annotations
 
 from dataclasses import replace
-from math import atan2, cos, sin, radians
+from math import atan2, cos, radians, sin
 
 import numpy as np
 from numpy.typing import NDArray

@@ -6,7 +6,7 @@
 // all values are 0 and the primitive is -1. World frame.
 //
 // SEEN_FILES are the files of the materials, if a requested AOV depends on them. To add an AOV: add a function
-// seen_NAME here, and its name in clrt/rendering/accumulation/first_hits.py.
+// seen_NAME here, with the same value in x, y and z if it has one channel, and its entry in clrt/aov_types.py.
 #include "integrator/camera_rays.cl"
 #include "film/film.cl"
 #include VISIBILITY
@@ -56,20 +56,21 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
 #if PRIMITIVES
     Surface surface;
     Sampler sampler;
-    ireal hit, other;
+    CameraRay ray;
+    ireal active, hit, other;
 #define ADD(name) name = add(name, choose(hit, seen_##name(&scene, &surface), splat(ZERO)));
     for (uint s = 0; s < launch.sample_count; ++s) {
         sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
-        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler);
-        hit = meet(&scene, &ray, own.inside, &sampler, &surface, &other, &other);
+        active = own.inside & camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler, &ray);
+        hit = meet(&scene, &ray, active, &sampler, &surface, &other, &other);
         SEEN_MEANS(ADD)
     }
     real2 middle = {(real)(0.5f), (real)(0.5f)};
     Launch pinhole = launch;
     pinhole.lens_radius = 0.0f;   // use the ray through the centre of a lens as well
     sampler = sampler_at(own.code, (ureal)(0), launch.seed, launch.block_bits);
-    CameraRay ray = camera_ray(&scene, &pinhole, own.x, own.y, middle, &sampler);
-    hit = meet(&scene, &ray, own.inside, &sampler, &surface, &primitive, &instance);
+    active = own.inside & camera_ray(&scene, &pinhole, own.x, own.y, middle, &sampler, &ray);
+    hit = meet(&scene, &ray, active, &sampler, &surface, &primitive, &instance);
     SEEN_MIDDLE(ADD)
 #endif
     if (loops_ended(2 + (launch.width == 0))) return;

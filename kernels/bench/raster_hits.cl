@@ -22,7 +22,9 @@ kernel void raster_hits(SCENE_PARAMETERS, global Seen *rasterised, global Seen *
         const LanePixels *pixels = own + count;
         Sampler sampler = sampler_at(pixels->code, (ureal)(launch.first_sample), launch.seed, launch.block_bits);
         real2 place = place_in_pixel(&scene, &launch, pixels->x, pixels->y, next_2d(&sampler));
-        rows[count++] = row_of(&launch, place, ray_through(&launch, place.x, place.y, &sampler), pixels->inside);
+        CameraRay ray;
+        ireal seen = pixels->inside & ray_through(&launch, place.x, place.y, &sampler, &ray);
+        rows[count++] = row_of(&launch, place, ray, seen);
     }
     if (count == 0) return;
     rasterise(&bins, &launch, LANE_UINT(own[0].x, 0), LANE_UINT(own[0].y, 0), rows, count);

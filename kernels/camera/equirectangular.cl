@@ -8,11 +8,12 @@
 // Beyond its edges the image wraps around, and over the poles.
 static inline real wrapped(real turns) { return turns - floor(turns); }
 
-static inline CameraRay ray_through(const Launch *launch, real sx, real sy, Sampler *sampler) {
+static inline ireal ray_through(const Launch *launch, real sx, real sy, Sampler *sampler, CameraRay *ray) {
     real3 right = broadcast(launch->right), up = broadcast(launch->up), forward = broadcast(launch->forward);
     real sin_phi, cos_phi, sin_theta, cos_theta;   // of the angle from backward to the right, and of the angle from up
     sincos_turns(wrapped(0.5f + 0.5f * sx), &sin_phi, &cos_phi);
     sincos_turns(wrapped(0.25f + 0.25f * sy), &sin_theta, &cos_theta);
     real3 level = sub(scale(right, -sin_phi), scale(forward, cos_phi));
-    return (CameraRay){broadcast(launch->position), mad3(level, sin_theta, scale(up, cos_theta))};
+    *ray = (CameraRay){broadcast(launch->position), mad3(level, sin_theta, scale(up, cos_theta))};
+    return ALL_LANES;
 }

@@ -2,7 +2,8 @@
 // f = tan(fov/2), a = w/h. right: a·f·r; up: f·u; forward: v. World frame.
 #include "core/vector.cl"
 
-static inline CameraRay ray_through(const Launch *launch, real sx, real sy, Sampler *sampler) {
+static inline ireal ray_through(const Launch *launch, real sx, real sy, Sampler *sampler, CameraRay *ray) {
     real3 right = broadcast(launch->right), up = broadcast(launch->up), forward = broadcast(launch->forward);
-    return (CameraRay){broadcast(launch->position), normalize3(mad3(right, sx, mad3(up, -sy, forward)))};
+    *ray = (CameraRay){broadcast(launch->position), normalize3(mad3(right, sx, mad3(up, -sy, forward)))};
+    return ALL_LANES;
 }

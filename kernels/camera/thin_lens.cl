@@ -6,12 +6,11 @@
 // right, up, forward: the pinhole's times s, so that they reach the plane of focus. World frame.
 #include "core/sampling.cl"
 
-static inline CameraRay ray_through(const Launch *launch, real sx, real sy, Sampler *sampler) {
+static inline ireal ray_through(const Launch *launch, real sx, real sy, Sampler *sampler, CameraRay *ray) {
     real3 right = broadcast(launch->right), up = broadcast(launch->up), forward = broadcast(launch->forward);
     real3 in_focus = mad3(right, sx, mad3(up, -sy, forward));
-    real2 u = next_2d(sampler);
-    real s, c, r = launch->lens_radius * sqrt(u.x);
-    sincos_turns(u.y, &s, &c);
-    real3 on_lens = mad3(normalize3(right), r * c, scale(normalize3(up), r * s));
-    return (CameraRay){add(broadcast(launch->position), on_lens), normalize3(sub(in_focus, on_lens))};
+    real2 at = sample_disc(next_2d(sampler), (real)(launch->lens_radius));
+    real3 on_lens = mad3(normalize3(right), at.x, scale(normalize3(up), at.y));
+    *ray = (CameraRay){add(broadcast(launch->position), on_lens), normalize3(sub(in_focus, on_lens))};
+    return ALL_LANES;
 }

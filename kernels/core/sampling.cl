@@ -15,11 +15,17 @@ static inline void sincos_turns(real u, real *sine, real *cosine) {
     *cosine = ((q + 1) & 2) != 0 ? -cosine_ : cosine_;
 }
 
+// Uniform over a disc around 0: pdf = 1/(pi·radius²).
+static inline real2 sample_disc(real2 u, real radius) {
+    real s, c, r = radius * sqrt(u.x);
+    sincos_turns(u.y, &s, &c);
+    return (real2){r * c, r * s};
+}
+
 // Cosine-weighted hemisphere around +z (Malley): pdf = z/pi.
 static inline real3 sample_cosine(real2 u) {
-    real s, c, r = sqrt(u.x);
-    sincos_turns(u.y, &s, &c);
-    return vector(r * c, r * s, safe_sqrt(1.0f - u.x));
+    real2 below = sample_disc(u, ONE);
+    return vector(below.x, below.y, safe_sqrt(1.0f - u.x));
 }
 static inline real cosine_pdf(real cos_theta) { return maximum(cos_theta, ZERO) * (1.0f / PI); }
 

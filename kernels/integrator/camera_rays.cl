@@ -3,10 +3,11 @@
 // The camera's file in camera/ provides, for the image position (sx, sy), from (−1, −1) at the upper left corner to
 // (1, 1) at the lower right, slightly beyond with a wide filter:
 //
-//   ray_through(launch, sx, sy, &sampler)     the camera ray; cameras without random numbers leave `sampler` alone
+//   ray_through(launch, sx, sy, &sampler, &ray)   the camera ray; cameras without random numbers leave `sampler` alone.
+//                                                 Returns the lanes that have one: the samples of the others are black,
+//                                                 and their rays, which nothing follows, are finite
 //
-// Each file documents the meaning of launch->right, up and forward; clrt/rendering/compile/camera_kernel.py computes
-// them.
+// Each file documents the meaning of launch->right, up and forward; clrt/scene/cameras.py computes them.
 #include "sampler/interface.cl"
 #include "core/vector.cl"
 #include FILTER
@@ -56,8 +57,9 @@ static inline real2 place_in_pixel(const Scene *scene, const Launch *launch, ure
                    2.0f * (TO_REAL(y) + filter_sample(scene, u.y)) / (float)launch->height - 1.0f};
 }
 
-// Return a camera ray through pixel (x, y), filter-sampled by u.
-static inline CameraRay camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u, Sampler *sampler) {
+// Generate a camera ray through pixel (x, y), filter-sampled by u. Returns the lanes that have one.
+static inline ireal camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u, Sampler *sampler,
+                               CameraRay *ray) {
     real2 place = place_in_pixel(scene, launch, x, y, u);
-    return ray_through(launch, place.x, place.y, sampler);
+    return ray_through(launch, place.x, place.y, sampler, ray);
 }

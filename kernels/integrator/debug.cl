@@ -141,16 +141,17 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
     uint first = (uint)get_global_id(0) * LANES;
     if (first >= launch.sample_count) return;
     ureal number = (ureal)(first) + LANE_INDEX;
-    ireal active = number < launch.sample_count;
+    ireal arrived = number < launch.sample_count;
     ureal x = (ureal)(launch.first_pixel % launch.width), y = (ureal)(launch.first_pixel / launch.width);
     Sampler sampler = sampler_at(pixel_code(x, y), launch.first_sample + number, launch.seed, launch.block_bits);
-    CameraRay ray = camera_ray(&scene, &launch, x, y, next_2d(&sampler), &sampler);
+    CameraRay ray;   // a sample without one escapes at once
+    ireal active = arrived & camera_ray(&scene, &launch, x, y, next_2d(&sampler), &sampler, &ray);
     Path path = path_along(ray.origin, ray.direction);
-    for (int depth = 1; ANY(active); ++depth) {
+    for (int depth = 1; ANY(arrived); ++depth) {
         VertexLanes v = blank_vertex();
         Surface surface;
         Hits hits = first_surface(&scene, path.origin, path.wi, depth == 1, active, &sampler, &surface);
-        ireal arrived = active, hit = active & (hits.primitive >= 0);
+        ireal hit = active & (hits.primitive >= 0);
         absorb(&path, hit ? hits.t : (real)(INFINITY));
         note_arrival(&scene, &path, &surface, &hits, hit, active & !hit, &v);
         v.emission_clamp = clamp_factor(&launch, v.emission, depth);
@@ -174,6 +175,7 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
         for (int lane = 0; lane < LANES; ++lane)
             if (LANE_INT(arrived, lane))
                 store_vertex(vertices + (first + lane) * launch.max_depth + depth - 1, &v, lane);
+        arrived = active;
     }
     if (!loops_ended(2 + (launch.width == 0))) return;
     for (uint lane = 0; lane < LANES && first + lane < launch.sample_count; ++lane)

@@ -26,10 +26,11 @@ kernel void megakernel(SCENE_PARAMETERS, global Pixel *film, global const uint *
 #else
         real2 place = next_2d(&sampler);
 #endif
-        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, place, &sampler);
+        CameraRay ray;
+        ireal active = own.inside & camera_ray(&scene, &launch, own.x, own.y, place, &sampler, &ray);
         real3 direct;
         real removed = ZERO;
-        real3 seen = seen_along(&scene, &launch, &ray, own.inside, &sampler, &pixels.rays, &direct, &removed);
+        real3 seen = seen_along(&scene, &launch, &ray, active, &sampler, &pixels.rays, &direct, &removed);
         ireal kept = accumulate(&pixels, seen, own.inside);
 #if CLAMP
         pixels.clamped += kept ? removed : ZERO;

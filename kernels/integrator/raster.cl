@@ -22,7 +22,9 @@ kernel void raster(SCENE_PARAMETERS, global Pixel *film, global const uint *tile
         for (int i = 0; i < count; ++i) {
             samplers[i] = sampler_at(own[i].code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
             real2 place = place_in_pixel(&scene, &launch, own[i].x, own[i].y, next_2d(samplers + i));
-            rows[i] = row_of(&launch, place, ray_through(&launch, place.x, place.y, samplers + i), own[i].inside);
+            CameraRay ray;
+            ireal seen = own[i].inside & ray_through(&launch, place.x, place.y, samplers + i, &ray);
+            rows[i] = row_of(&launch, place, ray, seen);
         }
         rasterise(&bins, &launch, LANE_UINT(own[0].x, 0), LANE_UINT(own[0].y, 0), rows, count);
         for (int i = 0; i < count; ++i) {

@@ -85,11 +85,15 @@ __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int sl
         Travel travel;
         travel.slot = (uint)i + LANE_INDEX;
         Sampler sampler = slot_sampler(w, travel.slot);
-        CameraRay ray = camera_ray(scene, w->launch, slot_x(w, travel.slot), slot_y(w, travel.slot), next_2d(&sampler),
-                                   &sampler);
+        CameraRay ray;
+        ireal seen = in_picture(w, travel.slot) & camera_ray(scene, w->launch, slot_x(w, travel.slot),
+                                                             slot_y(w, travel.slot), next_2d(&sampler), &sampler, &ray);
         travel.path = path_along(ray.origin, ray.direction);
-        PACK(travel, in_picture(w, travel.slot), w->arrivals, count)
+        PACK(travel, seen, w->arrivals, count)
         for (int c = 0; c < 3; ++c) vstore8(ZERO, 0, w->light[c] + i);
+#if DIRECT_LIGHT
+        for (int c = 0; c < 3; ++c) vstore8(ZERO, 0, w->direct[c] + i);   // the tile may have no camera rays at all
+#endif
 #if CLAMP
         vstore8(ZERO, 0, w->removed + i);
 #endif

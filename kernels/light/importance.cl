@@ -20,7 +20,7 @@ static inline real along_cone(real along, real distance, real cos_cone) {
     return along > cos_cone * distance ? distance : turned;
 }
 
-#if LIGHT_SPOT
+#if LIGHT_CONES
 // Whether a sphere of radius r is at least partly within an angle, of cosine cos_reach, of the nearest direction;
 // `along`: from along_cone.
 static inline ireal is_reached(real along, real distance, real r, real cos_reach) {
@@ -50,7 +50,7 @@ __attribute__((always_inline)) static inline real importance(const Scene *scene,
     real intensity = GATHER(real, scene->light_groups, group, .intensity);
     real irradiance = maximum(intensity * lit * shining / maximum(d2, r * r), (real)(LEAST_IMPORTANCE));
     ireal contributes = (intensity > 0.0f) & (lit > 0.0f) & (shining > 0.0f);
-#if LIGHT_SPOT
+#if LIGHT_CONES
     contributes = contributes & is_reached(along, distance, r, GATHER(real, scene->light_groups, group, .cos_reach));
 #endif
     return contributes ? irradiance : ZERO;

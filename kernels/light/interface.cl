@@ -1,8 +1,11 @@
 // The interface of a light type; its file provides, with NAME being its name:
 //
 //   NAME_light_sample(scene, index, p, u)              samples a direction from p towards the light
-//   NAME_light_pdf(scene, index, p, wi, t, surface)    its pdf per solid angle at wi (0 for delta lights, which no ray
-//                                                      hits)
+//
+// It reads what its class in clrt/scene/lights.py returns from `parameters`: GATHER3(scene->NAME_lights, index, .x).
+// Emissive surfaces also provide
+//
+//   NAME_light_pdf(scene, index, p, wi, t, surface)    its pdf per solid angle at wi
 //   NAME_light_radiance(scene, index, wi, surface)     radiance along wi from the surface that the ray hit
 //
 // The sky is seen by rays that escape: sky_radiance(scene, wi, &pdf) returns its radiance and that pdf; likewise
@@ -15,10 +18,11 @@
 
 typedef struct {
     real3 wi;
-    real3 radiance;     // along wi, unoccluded; the irradiance perpendicular to wi if `delta`
-    real pdf;           // per solid angle; 1 if `delta`
+    real3 radiance;     // along wi, unoccluded; the irradiance perpendicular to wi of a light without a size
+    real pdf;           // per solid angle; 1 for a light without a size
     real3 target;       // end of the shadow ray, see shadow_target; undefined if `infinite`
-    ireal infinite, delta;
+    ireal infinite;
+    ireal delta;        // no ray hits the light, so its samples count in full
 } LightSample;
 
 #if LIGHT_RANGES

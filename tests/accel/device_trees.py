@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clrt.accel.build import build_tree
-from clrt.accel.bvh import FloatArray, Bvh, half_area
+from clrt.accel.bvh import Bvh, FloatArray, half_area
 from clrt.accel.device_builder import SHAPES, program_source
 from clrt.accel.layouts import Layout, sphere_boxes
 from clrt.accel.morton import sort_primitives
@@ -29,7 +29,7 @@ def like_gpu(device: Device) -> Device:
     return replace(device, info=replace(device.info, type="gpu"))
 
 
-@lru_cache(maxsize=None)
+@cache
 def built(device: Device, layout: str, case: str) -> Layout:
     """Return the BVH of a scene, with its buffers on the host."""
     tree = build_tree(device, layout, "ploc", *SCENES[case])

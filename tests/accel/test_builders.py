@@ -7,13 +7,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from clrt.accel.builders import BUILDERS, midpoint, sah
-from clrt.accel.bvh import FloatArray, Bvh, half_area, join
+from clrt.accel.bvh import Bvh, FloatArray, half_area, join
 
 from .cases import NASTY, grid, soup, spheres
 

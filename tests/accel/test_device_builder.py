@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import pytest
@@ -88,7 +88,7 @@ def test_walls_of_a_room_do_not_share_a_leaf(device: Device) -> None:
     assert (size.min(axis=1) < 0.5 * size.max()).all()
 
 
-@lru_cache(maxsize=None)
+@cache
 def first_result(layout: str, case: str) -> list[dict[str, bytes]]:
     """Hold the result of the device that is tested first."""
     return []

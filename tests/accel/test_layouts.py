@@ -7,17 +7,26 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from clrt.accel.builders import BUILDERS
 from clrt.accel.bvh import FloatArray
 from clrt.accel.cwbvh import CWBVH_NODE
-from clrt.accel.layouts import (BVH2_NODE, BVH8_NODE, LAYOUTS, LEAF_SPHERE, LEAF_TRIANGLE, LONE_PACK, TRIANGLE_PACK,
-                                Layout, pack, sphere_boxes)
-from clrt.accel.traversal_kernels import TREELESS
+from clrt.accel.layouts import (
+    BVH2_NODE,
+    BVH8_NODE,
+    LAYOUTS,
+    LEAF_SPHERE,
+    LEAF_TRIANGLE,
+    LONE_PACK,
+    TRIANGLE_PACK,
+    Layout,
+    pack,
+    sphere_boxes,
+)
+from clrt.accel.methods import TREELESS
 from clrt.accel.wide import EMPTY
 from clrt.errors import UsageError
 
@@ -244,12 +253,12 @@ def test_boxes_of_spheres_contain_them(balls: FloatArray) -> None:
     toward = np.array([np.inf, -np.inf], np.float32)
     far = Fraction(float(np.finfo(np.float32).max))
     for (*center, size), low, high in zip(balls.tolist(), *sphere_boxes(balls)):
-        for c, l, h in zip(center, low, high):
-            assert np.isfinite([l, h]).all()
+        for c, least, most in zip(center, low, high):
+            assert np.isfinite([least, most]).all()
             exact_low, exact_high = Fraction(c) - Fraction(size), Fraction(c) + Fraction(size)
-            assert Fraction(float(l)) <= max(exact_low, -far) and Fraction(float(h)) >= min(exact_high, far)
+            assert Fraction(float(least)) <= max(exact_low, -far) and Fraction(float(most)) >= min(exact_high, far)
             if abs(exact_low) < far and abs(exact_high) < far:
-                inner = np.nextafter(np.nextafter(np.array([l, h]), toward), toward)
+                inner = np.nextafter(np.nextafter(np.array([least, most]), toward), toward)
                 assert Fraction(float(inner[0])) >= exact_low and Fraction(float(inner[1])) <= exact_high
 
 

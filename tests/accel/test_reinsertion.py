@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_trees_stay_sound_and_their_area_never_grows(device: Device, case: str) 
         area = tree.total_area
 
 
-@lru_cache(maxsize=None)
+@cache
 def first_result(case: str) -> list[bytes]:
     """Hold the result of the device that is tested first."""
     return []

@@ -7,11 +7,10 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from clrt.accel.builders import BUILDERS, midpoint, sah
-from clrt.accel.bvh import IntArray, Bvh, empty_tree, half_area, join
+from clrt.accel.bvh import Bvh, IntArray, empty_tree, half_area, join
 from clrt.accel.wide import EMPTY, MAX_PRIMITIVES, WideBvh, collapse, leaf_fields
 from clrt.errors import SceneError
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.accel.methods import LayoutName, TriangleTest
 from clrt.bench.numerics.cases import departures
 from clrt.bench.numerics.cases.departures import lit_scenes
 from clrt.bench.numerics.cases.distances import distances
@@ -33,7 +34,7 @@ def test_nothing_is_wrong(device: Device, measure: object) -> None:
 
 
 @pytest.mark.parametrize("layout", ["bvh2", "cwbvh", "packs", "list"])
-def test_other_trees_let_nothing_out_of_slivers(device: Device, layout: str) -> None:
+def test_other_trees_let_nothing_out_of_slivers(device: Device, layout: LayoutName) -> None:
     assert misses(Subject(device.info.index, layout=layout), sliver_tube(64), 20_000) == 0
 
 
@@ -44,7 +45,7 @@ def many_are_wrong(rows: Iterable[Row], count: int) -> bool:
 
 
 @pytest.mark.parametrize("triangle", ["moller_trumbore", "precomputed", "baldwin_weber"])
-def test_triangles_with_cracks_are_found_out(device: Device, triangle: str) -> None:
+def test_triangles_with_cracks_are_found_out(device: Device, triangle: TriangleTest) -> None:
     subject = Subject(device.info.index, triangle=triangle)
     assert many_are_wrong(measure_watertight(subject, quick=True), 1000)
 

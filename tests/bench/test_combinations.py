@@ -19,6 +19,7 @@ from clrt.bench.combinations.random_draws import Draws
 from clrt.bench.combinations.random_scenes import BATCH, random_scene
 from clrt.bench.numerics.kernel_probe import choices
 from clrt.device.open import Device
+from clrt.rendering.accumulation.launch_plan import LaunchPlan
 from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import LIGHTS, PointLight
@@ -64,7 +65,7 @@ def pixels(device: Device, side: Side) -> NDArray[np.float64]:
     scene = side.scenes[0]
     compiled = compile_scene(scene, choices(device))
     compiled = replace(compiled, chosen_files={**compiled.chosen_files, **side.files})
-    session = SingleDeviceAccumulation(device, compiled, scene.render.size, scene.render.max_depth, 1, 4)
+    session = SingleDeviceAccumulation(device, compiled, LaunchPlan(scene.render.size, scene.render.max_depth, 1, 4))
     for _ in session.render(4):
         pass
     return session.film().mean

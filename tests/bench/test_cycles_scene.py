@@ -9,6 +9,7 @@ import pytest
 
 from clrt.bench.renderers.cycles_scene import BSDFS, check_scene, frame_of_axes, sphere_triangles, turned
 from clrt.errors import UsageError
+from clrt.scene.lights import PointLight, SpotLight
 from clrt.scene.materials.material_types import MATERIALS, Material, MetallicRoughness
 from clrt.scene.model import Camera, RenderSettings, Scene, Sphere
 
@@ -48,6 +49,9 @@ def test_spheres_are_triangles_seen_from_outside() -> None:
 @pytest.mark.parametrize(("scene", "words"), [
     (ball(MetallicRoughness(metallic=0.5)), "the ball: .*fully metallic"),
     (ball(MetallicRoughness(metallic=1.0, smith="separable")), "the ball: .*height_correlated"),
+    (Scene(lights=[SpotLight(position=(0, 0, 0), direction=(0, 0, 1), intensity=(1, 1, 1))], name="room"),
+     "room: ranges and spot lights"),
+    (Scene(lights=[PointLight(position=(0, 0, 0), intensity=(1, 1, 1), range=2)], name="room"), "room: ranges and"),
     (replace(ball(MATERIALS[0]()), camera=Camera(aperture_radius=0.1)), "room: .*only pinhole cameras"),
     (replace(ball(MATERIALS[0]()), render=RenderSettings(max_depth=1)), "room: .*max_depth of 2"),
     (replace(ball(MATERIALS[0]()), render=RenderSettings(back_face_culling="all")), "room: back_face_culling is not"),

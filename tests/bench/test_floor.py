@@ -14,6 +14,7 @@ from clrt.bench.renderers.plastic_floor_model import MODELS, Lamp, Plastic, floo
 from clrt.cli.bench_floor import floor_command
 from clrt.scene.materials.material_types import MetallicRoughness
 from clrt.scene.model import Environment, Scene
+
 from ..oracle.materials.metallic_roughness import CookTorrance
 from ..oracle.surface import Surface
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import clrt
-from clrt.accel.traversal_kernels import TREELESS
+from clrt.accel.methods import TREELESS
 from clrt.bench.numerics.aimed_rays import all_rays, rays_of_kinds
 from clrt.bench.rays.hit_agreement import Case, Effort, measure_case
 from clrt.bench.rays.ray_speed import differing

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import clrt
-from clrt.accel.traversal_kernels import TREELESS
+from clrt.accel.methods import TREELESS
 from clrt.bench.rays.layout_speed import measure_layouts
 from clrt.bench.rays.shapes import icosphere
 from clrt.bench.rays.workloads import closed_room

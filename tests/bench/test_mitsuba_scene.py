@@ -15,8 +15,17 @@ from clrt.bench.renderers.mitsuba_renderer import newest_llvm
 from clrt.bench.renderers.mitsuba_scene import mitsuba_scene, rows_at_poles
 from clrt.errors import UsageError
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
-from clrt.scene.materials.material_types import (MATERIALS, BlinnPhong, Conductor, Dielectric, Diffuse, Material,
-                                                 MetallicRoughness, Mirror, Phong)
+from clrt.scene.materials.material_types import (
+    MATERIALS,
+    BlinnPhong,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Material,
+    MetallicRoughness,
+    Mirror,
+    Phong,
+)
 from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 

@@ -13,14 +13,24 @@ from click.testing import CliRunner
 from numpy.typing import NDArray
 
 from clrt.bench.renderers import render_fidelity
-from clrt.bench.renderers.fidelity_suite import (GENERATOR, golden, lanczos, orbit_camera, over_white, reduced,
-                                                 scenarios, shrunk, tone_mapped)
+from clrt.bench.renderers.fidelity_suite import (
+    GENERATOR,
+    golden,
+    lanczos,
+    orbit_camera,
+    over_white,
+    reduced,
+    scenarios,
+    shrunk,
+    tone_mapped,
+)
 from clrt.bench.renderers.render_fidelity import judge, verdict
 from clrt.cli.bench_render_fidelity import render_fidelity_command
 from clrt.errors import UsageError
 from clrt.formats.images.image_reader import linear_from_srgb
 from clrt.output.image import Image
 from clrt.output.view_transform import srgb
+
 from ..formats.glb import Gltf
 
 pytestmark = pytest.mark.needs("flip_evaluator")

@@ -10,11 +10,23 @@ from numpy.typing import NDArray
 
 import clrt
 from clrt.bench.rays.ray_speed import Floats
-from clrt.bench.rays.workloads import (GAP, Faces, Mesh, bounce_rays, bumpy_ball, camera_rays, closed_room,
-                                       light_rays, rotated_copies, subdivide, surface_points, workloads)
+from clrt.bench.rays.workloads import (
+    GAP,
+    Faces,
+    Mesh,
+    bounce_rays,
+    bumpy_ball,
+    camera_rays,
+    closed_room,
+    light_rays,
+    rotated_copies,
+    subdivide,
+    surface_points,
+    workloads,
+)
+from clrt.bench.significance import chi2_test, sidak
 from clrt.device.open import Device
 
-from clrt.bench.significance import chi2_test, sidak
 from ..rendering.rays import icosphere
 
 Doubles = NDArray[np.float64]

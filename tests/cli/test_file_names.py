@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from clrt.file_names import SHOWN, printable, utf8_path
 from clrt.formats.load_scene import load

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
 from click.testing import CliRunner
+from PIL import Image
 
 import clrt
 from clrt.cli.frames import numbered

@@ -14,8 +14,7 @@ import termios
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from clrt.cli.bar import BarProgress, StatusLine, bar, columns, fitted
 from clrt.cli.displays import make_progress

@@ -114,7 +114,7 @@ def test_lanes_and_launches_change_nothing(device: Device, monkeypatch: pytest.M
     scene = everything()
     whole = trace_pixel(scene, device, (7, 20))
     monkeypatch.setattr(trace, "MOST_RECORDS", 3 * scene.render.max_depth)
-    cut = trace_pixel(scene, device, (7, 20), Choices(layout="bvh8"), 16 if device.lanes == 1 else 1)
+    cut = trace_pixel(scene, device, (7, 20), Choices(16 if device.lanes == 1 else 1, layout="bvh8"))
     np.testing.assert_allclose(cut.values, whole.values, rtol=1e-4, atol=1e-6)
     assert np.array_equal(cut.starts, whole.starts)
 

@@ -10,11 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from clrt.device.discovery import discover, check_results
+from clrt.device.discovery import check_results, discover
 from clrt.device.discovery.check_results import forget_verdicts, keep_verdict, kept_verdict
-from clrt.device.discovery.device_info import Verdict
-from clrt.device.discovery.device_info import DeviceInfo
-from clrt.device.discovery.device_info import Speed
+from clrt.device.discovery.device_info import DeviceInfo, Speed, Verdict
 from clrt.device.discovery.discover import as_dict, choose, find_devices
 from clrt.device.programs import cache_files
 from clrt.device.programs.kernel_files import kernel_digest

@@ -34,7 +34,8 @@ from clrt.rendering.compile.choices import OFFSETS, Choices
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.geometry import instancing
 from clrt.scene.materials.material_types import MATERIALS
-from clrt.scene.model import Environment, Filter, Sampler
+from clrt.scene.model import Environment
+from clrt.scene.render_settings import Filter, Sampler
 
 from ..covering import others
 from ..rendering.lamps import lamps
@@ -97,24 +98,24 @@ def test_a_kernel_file_opens_with_what_it_is() -> None:
     assert not [name for name in FILES if not re.match(r"// \S", (KERNELS / name).read_text(encoding="utf-8"))]
 
 
-def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each file is used by a scene or choice, ray queries, the builder, refits, device checks or studies."""
+def used_without_scenes(device: Device) -> set[str]:
+    """Return the files of ray queries, builders, refits and device checks."""
     corners = np.zeros((3, 3), np.float32)
-    monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
-    used: set[str] = set()
+    sources = [turns_source(), *(refit.program_source(layout) for layout in refit.RECIPES),
+               *(kernel_calls.source(file, device.lanes) for file in kernel_calls.FILES),
+               *(compose("", entry, {}) for entry in ("check/turns.cl", "core/fma.cl")),
+               *(program_source(shape, True, True, True) for shape in SHAPES.values())]
     for layout, traversal in (("bvh8", "pool"), ("bvh8", "packet"), ("bvh2", "single")):
         query = clrt.InstancedRayQuery([(corners, [[0, 1, 2]])], [0], [np.eye(3, 4)], device=device.info.index,
                                        layout=layout)
-        used |= set(files_of(query.source("closest_hit", traversal)))
-    for layout in refit.RECIPES:
-        used |= set(files_of(refit.program_source(layout)))
-    used |= set(files_of(turns_source()))
-    for file in kernel_calls.FILES:
-        used |= set(files_of(kernel_calls.source(file, device.lanes)))
-    for entry in ("check/turns.cl", "core/fma.cl"):
-        used |= set(files_of(compose("", entry, {})))
-    for shape in SHAPES.values():
-        used |= set(files_of(program_source(shape, True, True, True)))
+        sources.append(query.source("closest_hit", traversal))
+    return {name for source in sources for name in files_of(source)}
+
+
+def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each file is used by a scene or choice, ray queries, the builder, refits, device checks or studies."""
+    monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
+    used = used_without_scenes(device)
     for layout in ("bvh8", "bvh2", "cwbvh", "list"):
         for i in range(len(TRIANGLE_TESTS)):
             tests = HitTests(*(list(known)[i % len(known)] for known in (TRIANGLE_TESTS, BOX_TESTS, SPHERE_TESTS)))

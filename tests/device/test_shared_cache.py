@@ -84,7 +84,12 @@ def test_memory_is_taken_where_the_temporary_folder_is_full(tmp_path: Path, monk
     memory = tmp_path / "memory"
     memory.mkdir()
     monkeypatch.setattr(driver_caches, "MEMORY", str(memory))
-    monkeypatch.setattr(driver_caches, "_has_room", lambda folder: folder.startswith(str(memory)))
+
+    def has_room(folder: str) -> bool:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        return folder.startswith(str(memory))
+
+    monkeypatch.setattr(driver_caches, "_has_room", has_room)
     monkeypatch.setattr(os, "getuid", lambda: os.stat(memory).st_uid + 1, raising=False)
     for name in ("XDG_CACHE_HOME", "POCL_CACHE_DIR"):
         monkeypatch.setenv(name, str(tmp_path))

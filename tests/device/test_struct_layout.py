@@ -19,7 +19,7 @@ from clrt.scene.materials.material_types import MATERIALS
 RECORDS: dict[str, np.dtype[Any]] = {
     f"{module.__name__.rsplit('.', 1)[1]}_{name}": value for module in (records, layouts, cwbvh, triangle_forms)
     for name, value in vars(module).items() if isinstance(value, np.dtype) and value.names
-} | {f"material_{kind.__name__}": records.material_record(material.parameters() for material in variants(kind))
+} | {f"material_{kind.__name__}": records.parameter_record(material.parameters() for material in variants(kind))
      for kind in MATERIALS}
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from clrt.errors import DeviceError
 from clrt.farm import worker_tasks
-from clrt.rendering.accumulation.device_worker import WorkerShare, DeviceWorker
+from clrt.rendering.accumulation.device_worker import DeviceWorker, WorkerShare
 
 if not hasattr(worker_tasks, "right"):    # Dask loads this more than once
     setattr(worker_tasks, "right", (worker_tasks.identity, worker_tasks.render_share, DeviceWorker.ended))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from clrt.formats.gltf.reader import read_gltf
 from clrt.scene.model import Model
+
 from ..scene.shapes import icosphere
 
 TYPES = {"<i1": 5120, "<u1": 5121, "<i2": 5122, "<u2": 5123, "<u4": 5125, "<f4": 5126}

@@ -16,6 +16,7 @@ from clrt.formats.gltf.reader import read_gltf
 from clrt.formats.load_scene import load
 from clrt.scene.materials.material_types import MetallicRoughness
 from clrt.scene.model import Model
+
 from ..scene.shapes import cube, icosphere
 from .glb import TRIANGLE, Gltf, ball, read
 

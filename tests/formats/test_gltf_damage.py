@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from clrt.errors import SceneError
 from clrt.formats.gltf.reader import read_gltf
+
 from .glb import Gltf, ball
 
 

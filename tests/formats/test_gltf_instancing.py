@@ -15,6 +15,7 @@ from clrt.formats.load_scene import load
 from clrt.scene.geometry import instancing
 from clrt.scene.geometry.instancing import baked
 from clrt.scene.model import Model
+
 from .glb import Gltf, ball
 
 COUNT = 7

@@ -13,6 +13,7 @@ import pytest
 from clrt.scene.materials.material import Material, as_color
 from clrt.scene.materials.material_types import Dielectric, MetallicRoughness
 from clrt.scene.materials.textures import Texture
+
 from ..scene.shapes import icosphere
 from .glb import TRIANGLE, Gltf, ball, read
 

@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.errors import SceneError
+
 from .glb import TRIANGLE, Gltf, read
 
 RNG = np.random.default_rng(31)

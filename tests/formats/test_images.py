@@ -14,8 +14,8 @@ import imageio.v3 as imageio
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from PIL import Image
 from numpy.typing import NDArray
+from PIL import Image
 
 from clrt.errors import SceneError
 from clrt.formats.images import decoder

@@ -13,6 +13,7 @@ from clrt.formats.models import read_mesh
 from clrt.formats.ply import plain_ply
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Mesh
+
 from ..scene.shapes import cube, icosphere, volume
 
 VERTICES, FACES = icosphere(1)

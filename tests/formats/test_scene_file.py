@@ -16,6 +16,7 @@ from clrt.rendering.checkpoint.identity import scene_hash
 from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, RenderSettings, Sphere
+
 from ..scene.shapes import icosphere
 from .glb import Gltf
 

@@ -21,6 +21,7 @@ from clrt.scene.lights import PointLight
 from clrt.scene.materials.material_types import Dielectric, Diffuse, MetallicRoughness, Mirror
 from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
+
 from .glb import Gltf, ball
 from .test_gltf import cameras
 

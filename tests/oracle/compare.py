@@ -17,6 +17,7 @@ from clrt.bench.numerics.kernel_probe import choices
 from clrt.bench.renderers.agreement import block_means
 from clrt.bench.significance import FAMILY, corrected, t_test
 from clrt.device.open import Device
+from clrt.rendering.accumulation.launch_plan import LaunchPlan
 from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.geometry import instancing
@@ -88,7 +89,7 @@ def _session(device: Device, scene: Scene) -> SingleDeviceAccumulation:
     """Return a session in which instances with few triangles remain instances."""
     with patch.object(instancing, "FEW_TRIANGLES", 0):
         compiled = compile_scene(scene, choices(device), device=device)
-    return SingleDeviceAccumulation(device, compiled, scene.render.size, scene.render.max_depth, 0)
+    return SingleDeviceAccumulation(device, compiled, LaunchPlan(scene.render.size, scene.render.max_depth, 0))
 
 
 def _image(session: SingleDeviceAccumulation, scene: Scene, seed: int, spp: int) -> Doubles:

@@ -9,8 +9,15 @@ from typing import Any, TypeVar, get_args
 import numpy as np
 
 from clrt.scene.materials.material import Material
-from clrt.scene.materials.material_types import (BlinnPhong, Conductor, Dielectric, Diffuse, MetallicRoughness,
-                                                 Mirror, Phong)
+from clrt.scene.materials.material_types import (
+    BlinnPhong,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    MetallicRoughness,
+    Mirror,
+    Phong,
+)
 from clrt.scene.materials.metallic_roughness import Coupling, Smith
 from clrt.scene.materials.presets import CONDUCTORS, F0_PRESETS
 from clrt.scene.materials.textures import Channel, Picture, Texture, Wrap

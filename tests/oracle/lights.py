@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.scene.lights import DirectionalLight, Light, PointLight, SpotLight
+from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.model import Environment, Scene
 
 from .textures import bilinear
 from .vectors import Doubles, dot, unit
 
+Known = PointLight | SpotLight | DirectionalLight
 #: Directional lights below this angular diameter in degrees are delta lights.
 POINT = 1e-4
 
@@ -25,12 +26,15 @@ def escaped(scene: Scene, direction: Doubles) -> Doubles:
     return radiance
 
 
-def delta_lights(scene: Scene) -> list[Light]:
-    """Return the lights that only direct summation finds."""
-    return [light for light in scene.lights if not isinstance(light, DirectionalLight) or light.angle_degrees < POINT]
+def delta_lights(scene: Scene) -> list[Known]:
+    """Return the lights that only direct summation finds. Raises TypeError for types without a formula here."""
+    known: list[Known] = [light for light in scene.lights if isinstance(light, Known)]
+    if len(known) < len(scene.lights):
+        raise TypeError("the oracle knows only point, spot and directional lights")
+    return [light for light in known if not isinstance(light, DirectionalLight) or light.angle_degrees < POINT]
 
 
-def arriving(light: Light, p: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+def arriving(light: Known, p: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     """Return unit directions to a delta light from points (n, 3), distances (n,), and irradiance (n, 3) facing it."""
     if isinstance(light, DirectionalLight):
         towards = np.tile(-unit(np.array(light.direction, float)), (len(p), 1))

@@ -13,13 +13,13 @@ from typing import get_args
 
 import numpy as np
 
+from clrt.scene.cameras import Projection
 from clrt.scene.geometry.transform import rotation, scaling, transform_mesh, translation
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.materials.material_types import Diffuse, Material
-from clrt.scene.model import (Camera, Environment, Instance, Mesh, Projection, RenderSettings, Scene, Sphere,
-                              Vector)
-from ..scene.shapes import icosphere
+from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere, Vector
 
+from ..scene.shapes import icosphere
 from .draws import DRAWERS, Draws, random_material
 from .vectors import Doubles
 

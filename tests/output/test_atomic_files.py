@@ -20,7 +20,7 @@ from clrt.output.video import VIDEOS, write_video
 if sys.platform == "win32":
     pytest.skip("there are no limits of a file's size", allow_module_level=True)
 
-import resource    # noqa: E402
+import resource  # noqa: E402
 
 
 @contextmanager

@@ -15,7 +15,6 @@ from clrt.formats.images.image_reader import linear_from_srgb
 from clrt.output.ocio import ACES, ocio_view
 from clrt.output.view_transform import VIEWS, to_display, view_called
 
-
 #: Views that tint gray slightly: the rows of their matrices sum to 1 only to about 1e-4.
 TINTED = ("agx", "aces")
 #: All views of linear light that need no user config.

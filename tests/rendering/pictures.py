@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from clrt.bench.numerics.kernel_probe import choices
 from clrt.bench.significance import mean_test
 from clrt.device.open import Device
+from clrt.rendering.accumulation.launch_plan import LaunchPlan
 from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.film.film import Film
 from clrt.scene.materials.material_types import Material
-from clrt.scene.model import Camera, Mesh, Sampler, Scene
-
+from clrt.scene.model import Camera, Mesh, Scene
+from clrt.scene.render_settings import Sampler
 
 Doubles = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ def session(device: Device, scene: Scene, sampler: Sampler = "independent", **ch
     """
     settings = replace(scene.render, sampler=sampler)
     compiled = compile_scene(replace(scene, render=settings), choices(device, **chosen))
-    return SingleDeviceAccumulation(device, compiled, settings.size, settings.max_depth, settings.seed, settings.spp)
+    return SingleDeviceAccumulation(device, compiled, LaunchPlan.of(settings, settings.spp))
 
 
 def film(device: Device, scene: Scene, spp: int | None = None, **chosen: Any) -> Film:

@@ -39,7 +39,10 @@ def rendered(scene: Scene, names: str = ",".join(AOVS), spp: int = 4, **options:
     return image.pixels, image.aovs  # type: ignore[return-value]
 
 
-def ball_on_floor(at: Doubles = np.zeros(3), scale: float = 1.0) -> Scene:
+ORIGIN = np.zeros(3)
+
+
+def ball_on_floor(at: Doubles = ORIGIN, scale: float = 1.0) -> Scene:
     """Return a red sphere above a white floor of 2 triangles, in a constant environment, translated and scaled."""
     def place(p: Any) -> Any:
         return tuple((scale * np.array(p, np.float64) + at).tolist())

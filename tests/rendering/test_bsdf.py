@@ -15,7 +15,6 @@ from clrt.scene.materials.material_types import MATERIALS, Diffuse, Material, Me
 
 from ..oracle.draws import DRAWERS, Draws, random_material
 from ..oracle.scenes import todays_seed
-
 from .ggx import cook_torrance
 
 pytestmark = pytest.mark.statistics

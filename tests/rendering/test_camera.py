@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
+from pathlib import Path
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import clrt
 from clrt.bench.numerics.kernel_probe import choices
 from clrt.bench.significance import sidak
+from clrt.debug.record import PathEnd
+from clrt.debug.trace import trace_pixel
 from clrt.device.open import Device
+from clrt.device.programs import program
 from clrt.rendering.accumulation.denoiser_guides import render_guides
+from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.cameras import CAMERA_TYPES, Perspective, Projection
 from clrt.scene.materials.material_types import Diffuse
-from clrt.scene.model import Camera, Environment, Projection, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 
 from ..covering import others
 from .pictures import film, frame, pixel_p_values, session
 from .skies import lookup
 
 Doubles = NDArray[np.float64]
+KERNELS = Path(__file__).parents[2] / "kernels"
 CAMERAS = {
     "plain": Camera(position=(0.0, 0.0, 5.0), look_at=(0.0, 0.0, 0.0), fov_degrees=40),
     "wide": Camera(position=(1.0, 2.0, 3.0), look_at=(4.0, 2.5, -3.0), fov_degrees=110),
@@ -192,6 +202,60 @@ def test_pictures_do_not_depend_on_the_unit_of_length(device: Device, name: str)
                       render=RenderSettings(size=(24, 18), spp=4, max_depth=1))
         pictures.append(film(device, scene).mean)
     assert pictures[0].any() and all(np.array_equal(picture, pictures[0]) for picture in pictures)
+
+
+def test_camera_types_are_complete() -> None:
+    """The scene file accepts every type; a kernel file defines ALL_AROUND if its class says so."""
+    assert tuple(CAMERA_TYPES) == get_args(Projection)
+    for kind in CAMERA_TYPES.values():
+        text = (KERNELS / "camera" / f"{kind.kernel}.cl").read_text(encoding="utf-8")
+        assert ("#define ALL_AROUND 1" in text) == kind.all_around
+
+
+HALF = """#include "core/vector.cl"
+static inline ireal pinhole_ray(const Launch *launch, real sx, real sy, Sampler *sampler, CameraRay *ray) {
+    real3 right = broadcast(launch->right), up = broadcast(launch->up), forward = broadcast(launch->forward);
+    *ray = (CameraRay){broadcast(launch->position), normalize3(mad3(right, sx, mad3(up, -sy, forward)))};
+    return ALL_LANES;
+}
+static inline ireal ray_through(const Launch *launch, real sx, real sy, Sampler *sampler, CameraRay *ray) {
+    return pinhole_ray(launch, sx, sy, sampler, ray) & (sx > 0.0f);
+}
+"""
+
+
+@pytest.mark.parametrize("paths", ["waves", "lanes"])
+def test_a_camera_may_have_no_ray(device: Device, paths: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a camera with rays in its right half alone, that half is the pinhole's and the other is black, in the image,
+    its AOVs, the denoiser's guides and the record of paths; samples are counted in both, rays only in one."""
+    sky, red = Environment(color=(1.0, 2.0, 3.0)), Diffuse(color=(0.7, 0.2, 0.1), emission=(0.1, 0.1, 0.1))
+    scene = Scene(spheres=[Sphere(material=red)], environment=sky, camera=Camera(),
+                  render=RenderSettings(size=(32, 16), spp=4))
+    options: dict[str, Any] = {"device": device.info.index, "paths": paths, "lanes": 8, "first_hits": True,
+                               "aovs": "albedo,normal,position,depth,object,direct,indirect,samples"}
+
+    def rendered() -> tuple[dict[str, NDArray[np.generic]], int]:
+        renderer = clrt.Renderer(scene, **options)
+        *_, state = renderer.passes(spp=4)
+        rays = int(state.film.pixels["rays"].sum())
+        return {"image": state.pixels, **renderer.aovs(state), **{
+            f"guide {name}": guide for name, guide in renderer.session.guides().items()}}, rays
+
+    whole, rays = rendered()
+    shutil.copytree(KERNELS, tmp_path / "kernels")
+    (tmp_path / "kernels" / "camera" / "half.cl").write_text(HALF)
+    monkeypatch.setattr(program, "kernel_folder", lambda: tmp_path / "kernels")
+    monkeypatch.setattr(Perspective, "kernel", "half")
+    half, fewer = rendered()
+    for name, picture in half.items():
+        assert np.array_equal(picture[:, 16:], whole[name][:, 16:]), name
+        nothing = {"depth": np.inf, "object": -1, "samples": 4}.get(name, 0)
+        assert np.all(picture[:, :16] == nothing), name
+    assert fewer == pytest.approx(rays / 2, rel=0.05) and whole["image"][:, :16].all()
+    for column, black in ((2, True), (29, False)):
+        traced = trace_pixel(scene, device, (column, 8), Choices(lanes=8))
+        assert len(traced.starts) == 4 and np.all(traced.rows["end"] == PathEnd.ESCAPED)
+        np.testing.assert_allclose(traced.value, 0 if black else sky.color, rtol=1e-6)
 
 
 def test_a_camera_compiles_to_its_own_file(device: Device) -> None:

@@ -16,6 +16,7 @@ from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.film.film import Film
 from clrt.scene.materials.material_types import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from .checkpoints import renderer, run, same
 from .pictures import film
@@ -79,7 +80,8 @@ def test_the_report_names_the_bias(device: Device) -> None:
     assert report["clamped_part"] == pytest.approx(0.75)
     assert report["warnings"] == ["the image is biased by clamp_direct: 75.00% of the light was removed; the "
                                   "estimated error does not include this bias"]
-    for clamp, integrator in ((0.0, "path"), (1.0, "local")):
+    others: list[tuple[float, Integrator]] = [(0.0, "path"), (1.0, "local")]
+    for clamp, integrator in others:
         report = clrt.render(scene, clamp_direct=clamp, integrator=integrator, **chosen).report
         assert report["biased_by"] == report["warnings"] == [] and "clamped_part" not in report
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from clrt.device.open import Device
 from clrt.rendering.compile.lights.hidden_lights import hidden_lights
 from clrt.scene.materials.material_types import Diffuse
-from clrt.scene.model import Camera, Integrator, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from .pictures import film
 

@@ -10,8 +10,7 @@ from clrt.bench.numerics.kernel_probe import Doubles
 from clrt.bench.numerics.scattering import above
 from clrt.device.open import Device
 from clrt.scene.materials.material_types import Conductor
-from clrt.scene.materials.presets import F0_PRESETS
-from clrt.scene.materials.presets import CONDUCTORS
+from clrt.scene.materials.presets import CONDUCTORS, F0_PRESETS
 
 from .ggx import masking
 

@@ -15,9 +15,9 @@ from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.geometry import instancing
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials.material import Culling
 from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, Mirror
-from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Culling, Integrator
 
 from ..covering import covering, others
 from .pictures import box, film, quad

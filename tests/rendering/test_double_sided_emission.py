@@ -12,13 +12,23 @@ from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
 from clrt.rendering.film.film import Film
 from clrt.scene.materials.material_types import Diffuse
-from clrt.scene.model import Camera, Integrator, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from . import rays
 from .lamps import directions
 from .pictures import film, quad
-from .test_lights import (COUNT, FAMILY, LAMP, POINTS, RADIANCE, assert_mean, irradiances, rectangle,
-                          rectangle_irradiance)
+from .test_lights import (
+    COUNT,
+    FAMILY,
+    LAMP,
+    POINTS,
+    RADIANCE,
+    assert_mean,
+    irradiances,
+    rectangle,
+    rectangle_irradiance,
+)
 
 pytestmark = pytest.mark.statistics
 

@@ -7,12 +7,12 @@ import pytest
 from scipy.integrate import quad as integral
 from scipy.signal.windows import blackmanharris
 
+from clrt.bench.significance import rejected
 from clrt.device.open import Device
 from clrt.rendering.compile.pixel_filters import CELLS, FILTERS, filter_quantiles
 from clrt.scene.materials.material_types import Diffuse
-from clrt.scene.model import Camera, Filter, RenderSettings, Scene
-
-from clrt.bench.significance import rejected
+from clrt.scene.model import Camera, RenderSettings, Scene
+from clrt.scene.render_settings import Filter
 
 from .pictures import film, pixel_p_values, quad
 

@@ -16,7 +16,8 @@ from clrt.errors import UsageError
 from clrt.output.images import read_image
 from clrt.rendering.accumulation.denoiser_guides import render_guides
 from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
-from clrt.scene.model import Camera, Integrator, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from ..covering import others
 from .pictures import film, frame, quad, session, view_rays

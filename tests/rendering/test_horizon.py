@@ -19,7 +19,8 @@ from clrt.scene.lights import DirectionalLight
 from clrt.scene.materials.material import Material
 from clrt.scene.materials.material_types import Conductor, Dielectric, Diffuse, MetallicRoughness, Mirror, Phong
 from clrt.scene.materials.textures import Picture, Texture
-from clrt.scene.model import Camera, Environment, Integrator, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from .ggx import bump_shadowing
 from .pictures import film, quad

@@ -23,8 +23,17 @@ from clrt.device.open import Device
 from clrt.farm.banded_picture import BandedPicture
 from clrt.farm.orders import PictureOrder
 from clrt.live.settings import Settings
-from clrt.rendering.checkpoint.identity import (CODE, ENDS, NAMES, ROUNDING, UNSEEN, code_digest, differences, facts_of,
-                                                scene_hash)
+from clrt.rendering.checkpoint.identity import (
+    CODE,
+    ENDS,
+    NAMES,
+    ROUNDING,
+    UNSEEN,
+    code_digest,
+    differences,
+    facts_of,
+    scene_hash,
+)
 from clrt.rendering.compile.choices import Choices
 from clrt.rendering.render_report import render_report
 from clrt.rendering.renderer_options import choices_of, settings_of
@@ -125,7 +134,7 @@ def test_no_other_package_takes_part_in_samples() -> None:
         "accel",    # affects rounding only
         "device", "awake", "threads",    # compile and launch, in any order
         "formats",    # file names of scenes
-        "errors", "file_names", "file_mode", "float_errors"}
+        "errors", "option_fields", "file_names", "file_mode", "float_errors"}
 
 
 def things(value: Any) -> Iterator[Any]:

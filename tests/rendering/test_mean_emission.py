@@ -6,8 +6,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from clrt.rendering.compile.lights.mean_emission import mean_texels
 from clrt.scene.materials.textures import Picture, Texture, Wrap

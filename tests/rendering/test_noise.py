@@ -16,7 +16,8 @@ from clrt.rendering.film.film import RELATIVE_FLOOR, Film
 from clrt.rendering.film.tiles import tile_sums
 from clrt.rendering.renderer import Renderer
 from clrt.scene.materials.material_types import Diffuse, MetallicRoughness
-from clrt.scene.model import Camera, Environment, RenderSettings, Sampler, Scene, Sphere
+from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Sampler
 
 from .pictures import box, quad
 

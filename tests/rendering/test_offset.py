@@ -12,7 +12,6 @@ from clrt.scene.model import Mesh, Scene, Sphere
 
 from ..covering import covering
 
-
 Doubles = NDArray[np.float64]
 COUNT = 1_000_000
 OFFSETS = (0.0, 1e3, 1e6)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from clrt.bench.significance import chi2_test
 from clrt.device.open import Device
+from clrt.rendering.compile.choices import Lanes
 from clrt.rendering.renderer import Renderer
 from clrt.scene.lights import DirectionalLight
 from clrt.scene.materials.material_types import Diffuse, Material, Mirror
@@ -35,7 +36,7 @@ def lamp(red: float, green: float, blue: float) -> Diffuse:
     return Diffuse(color=BLACK, emission=(red, green, blue))
 
 
-def seen(device: Device, *meshes: Mesh, lanes: int | None = None, spp: int = SPP, **rest: Any) -> NDArray[np.float64]:
+def seen(device: Device, *meshes: Mesh, lanes: Lanes | None = None, spp: int = SPP, **rest: Any) -> NDArray[np.float64]:
     """Return the image (16, 16, 3) of [-1, 1]² from far above."""
     angle = float(np.degrees(2 * np.arctan(1 / 1000)))
     scene = Scene(meshes=list(meshes), camera=Camera(position=(0, 0, 1000), look_at=(0, 0, 0), fov_degrees=angle),
@@ -108,7 +109,7 @@ def test_opaque_materials_stop_all_light(device: Device, other: Material, one_si
 
 
 @pytest.mark.parametrize("lanes", [1, 8])
-def test_shadows_of_veils(device: Device, lanes: int) -> None:
+def test_shadows_of_veils(device: Device, lanes: Lanes) -> None:
     """Shadows have the transmitted light, without noise; a one-sided surface stops no ray from behind."""
     ground = quad(Diffuse(color=(0.5, 0.5, 0.5)))
     sun = DirectionalLight(direction=(1, 0, -1), irradiance=(2, 2, 2))

@@ -11,7 +11,7 @@ from clrt.device.launches.buffer_limit import VARIABLE
 from clrt.device.launches.device_arrays import on_device
 from clrt.device.open import Device
 from clrt.errors import DeviceError, NoRoomError, SceneError, UsageError
-from clrt.rendering.accumulation.launch_plan import first_launch
+from clrt.rendering.accumulation.launch_plan import LaunchPlan
 from clrt.rendering.accumulation.multi_device import MultiDeviceAccumulation
 from clrt.rendering.accumulation.raster_bins import RasterBins
 from clrt.rendering.compile.choices import Choices
@@ -48,7 +48,7 @@ def test_bins_are_in_the_memory_plan(device: Device) -> None:
     scene = Scene(meshes=[ball(4, (0.0, 0.0, -3.0))], camera=AHEAD, render=SETTINGS)
     compiled = compile_scene(scene, Choices(), device=device)
     arguments = [*(on_device(device, array) for _, array in compiled.buffers.values()), compiled.counts[0]]
-    bins, launch = RasterBins(device, compiled, arguments), first_launch(compiled, SIZE, 2, 0, None)
+    bins, launch = RasterBins(device, compiled, arguments), LaunchPlan(SIZE, 2, 0).record(compiled)
     full = {"film": device.info.global_bytes - 64 * 5120 // 4}
     with pytest.raises(NoRoomError, match="outlines .* KiB"):
         bins.of(launch, full)

@@ -16,7 +16,8 @@ from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import Light, PointLight
 from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness
-from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from .ggx import masking
 from .pictures import film, quad

@@ -13,7 +13,8 @@ from clrt.bench.numerics.kernel_probe import Doubles, Probe
 from clrt.bench.significance import FAMILY, chi2_test, mean_test, rejected
 from clrt.device.open import Device
 from clrt.scene.materials.material_types import Diffuse
-from clrt.scene.model import Camera, RenderSettings, Sampler, Scene, Sphere
+from clrt.scene.model import Camera, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Sampler
 
 from .pictures import film, quad
 

@@ -18,7 +18,7 @@ SAMPLES = 1 << 16
 #: Kernel text and replacements that make it slightly wrong.
 WRONG_WARPS = {
     "cone": ("h = u.x * height;", "h = u.x * height * (0.9f + 0.1f * u.x);"),
-    "cosine": ("real s, c, r = sqrt(u.x);", "real s, c, r = sqrt(u.x * (0.9f + 0.1f * u.x));"),
+    "cosine": ("r = radius * sqrt(u.x);", "r = radius * sqrt(u.x * (0.9f + 0.1f * u.x));"),
     "triangle": ("real root = sqrt(u.x);", "real root = sqrt(u.x * (0.9f + 0.1f * u.x));"),
     "turns": ("real x = (u * 4.0f - TO_REAL(q)) * (0.5f * PI);", "real x = (u * 4.0f - TO_REAL(q)) * (0.48f * PI);"),
     "visible normals": ("vector(wo.x * alpha, wo.y * alpha, wo.z)", "vector(wo.x * alpha, wo.y * alpha, 1.1f * wo.z)"),

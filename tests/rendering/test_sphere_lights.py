@@ -12,7 +12,8 @@ from clrt.bench.numerics.bsdf_cases import variants
 from clrt.device.open import Device
 from clrt.scene.geometry import instancing
 from clrt.scene.materials.material_types import MATERIALS, Diffuse, Material
-from clrt.scene.model import Camera, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Instance, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from .lamps import directions
 from .pictures import film

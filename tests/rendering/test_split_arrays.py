@@ -9,6 +9,7 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
+from clrt.accel.methods import LayoutName
 from clrt.device.launches.buffer_limit import VARIABLE, largest_buffer
 from clrt.device.launches.memory_plan import OVERLAP, part_count, part_records, parts
 from clrt.device.open import Device
@@ -19,6 +20,7 @@ from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.renderer import Renderer
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Mesh, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from ..covering import others
 from .rays import icosphere
@@ -33,7 +35,7 @@ def scene() -> Scene:
     return replace(full, spheres=[*full.spheres, *more])
 
 
-def film(device: Device, layout: str, integrator: str = "path") -> tuple[Renderer, bytes]:
+def film(device: Device, layout: LayoutName, integrator: Integrator = "path") -> tuple[Renderer, bytes]:
     running = Renderer(scene(), device=device.info.index, layout=layout, spp=4, integrator=integrator)
     return running, list(running.passes(spp=4))[-1].film.pixels.tobytes()
 
@@ -54,7 +56,8 @@ LIMITS = [("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8), ("packs", 12)]
 
 @pytest.mark.parametrize(("layout", "limit"), [("bvh8", 8), *others(*LIMITS)])
 def test_in_parts_it_is_the_same_picture(device: Device, whole: tuple[Renderer, bytes],
-                                         monkeypatch: pytest.MonkeyPatch, layout: str, limit: int) -> None:
+                                         monkeypatch: pytest.MonkeyPatch, layout: LayoutName,
+                                         limit: int) -> None:
     """Bit for bit, in every layout; no buffer exceeds the limit, and at 8 KiB most arrays fill several."""
     running = assert_same_in_parts(device, whole, monkeypatch, layout, limit)
     assert len(buffers_of(running)) > len(running.compiled.buffers) + (0 if limit > 8 else 6)
@@ -62,7 +65,8 @@ def test_in_parts_it_is_the_same_picture(device: Device, whole: tuple[Renderer, 
 
 @pytest.mark.parametrize(("layout", "limit"), LIMITS[1:3] + others(LIMITS[0], *LIMITS[3:]))
 def test_in_parts_the_same_is_seen_first(device: Device, whole_depth: tuple[Renderer, bytes],
-                                         monkeypatch: pytest.MonkeyPatch, layout: str, limit: int) -> None:
+                                         monkeypatch: pytest.MonkeyPatch, layout: LayoutName,
+                                         limit: int) -> None:
     """As above, for the depth integrator, whose programs are small."""
     running = assert_same_in_parts(device, whole_depth, monkeypatch, layout, limit)
     assert len(buffers_of(running)) > len(running.compiled.buffers)
@@ -72,8 +76,8 @@ def buffers_of(running: Renderer) -> list[cl.Buffer]:
     return [each for each in running.session.scene_arguments if isinstance(each, cl.Buffer)]
 
 
-def assert_same_in_parts(device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch, layout: str,
-                         limit: int) -> Renderer:
+def assert_same_in_parts(device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch,
+                         layout: LayoutName, limit: int) -> Renderer:
     """Return the renderer whose largest buffer has `limit` KiB, after checking that its image is that of `whole`."""
     assert isinstance(whole[0].session, SingleDeviceAccumulation) and whole[0].compiled.part_bytes is None
     monkeypatch.setenv(VARIABLE, f"{limit}K")

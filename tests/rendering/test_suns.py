@@ -13,7 +13,8 @@ from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight, Light
 from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
-from clrt.scene.model import Camera, Environment, Integrator, Mesh, RenderSettings, Scene
+from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene
+from clrt.scene.render_settings import Integrator
 
 from .ggx import cook_torrance
 from .pictures import film, pixel_means, pixel_points, quad

@@ -13,6 +13,7 @@ from scipy.ndimage import map_coordinates
 
 from clrt.bench.numerics.kernel_probe import Probe
 from clrt.device.open import Device
+from clrt.rendering.compile.choices import Lanes
 from clrt.rendering.renderer import Renderer
 from clrt.scene.lights import DirectionalLight
 from clrt.scene.materials.material_types import Diffuse, Material, MetallicRoughness
@@ -214,7 +215,7 @@ def test_normal_maps_on_spheres(device: Device) -> None:
 
 @pytest.mark.parametrize("cut", [False, True], ids=["painted", "cut out"])
 @pytest.mark.parametrize("lanes", [8, *others(1)])
-def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: int, cut: bool) -> None:
+def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: Lanes, cut: bool) -> None:
     """A picture that is half black, as emission or opacity: the light below is that of the other half alone, by light
     samples and without.
 

@@ -14,7 +14,8 @@ from clrt.device.open import Device
 from clrt.scene.geometry import instancing
 from clrt.scene.lights import DirectionalLight
 from clrt.scene.materials.material_types import Diffuse
-from clrt.scene.model import Camera, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Instance, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator
 
 from .pictures import film
 

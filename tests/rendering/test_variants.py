@@ -23,7 +23,8 @@ from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.materials.material_types import MATERIALS, Dielectric, Diffuse, MetallicRoughness, Mirror
 from clrt.scene.materials.textures import Picture, Texture
-from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Sampler, Scene, Sphere
+from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.render_settings import Integrator, Sampler
 
 from ..covering import others
 from . import rays

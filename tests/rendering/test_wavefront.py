@@ -90,5 +90,5 @@ def test_waves_need_eight_lanes(device: Device) -> None:
     with pytest.raises(UsageError, match="waves needs 8 lanes, not 1"):
         Renderer(everything(), device=device.info.index, lanes=1, paths="waves")
     with pytest.raises(UsageError, match="paths 'rows' is unknown; choose from lanes, waves"):
-        Renderer(everything(), device=device.info.index, paths="rows")
-    assert [Choices(lanes).waves for lanes in (1, 8, 16)] == [False, True, False]
+        Renderer(everything(), device=device.info.index, paths="rows")  # type: ignore[arg-type]
+    assert [Choices(lanes).on(None).paths for lanes in (1, 8, 16)] == ["lanes", "waves", "lanes"]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from clrt.scene.geometry.normals import choose_normals, smooth_normals, weld
+
 from .shapes import cube, icosphere
 
 EPS = float(np.finfo(np.float32).eps)

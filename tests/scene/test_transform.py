@@ -4,9 +4,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from clrt.scene.geometry.transform import (quaternion, rotation, scaling, transform_camera, transform_mesh,
-                                           translation, unit)
+from clrt.scene.geometry.transform import (
+    quaternion,
+    rotation,
+    scaling,
+    transform_camera,
+    transform_mesh,
+    translation,
+    unit,
+)
 from clrt.scene.model import Camera, Mesh
+
 from .shapes import icosphere, volume
 
 EPS = float(np.finfo(np.float32).eps)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...device.open import Device
 from ...output.scenes import save_scene
-from ...rendering.accumulation.launch_plan import depth_of
+from ...rendering.accumulation.launch_plan import LaunchPlan
 from ...rendering.accumulation.single_device import SingleDeviceAccumulation
 from ...rendering.compile.compile_scene import compile_scene
 from ..numerics.kernel_probe import choices
@@ -154,8 +154,7 @@ def _rendered(device: Device, side: Side, number: int, spp: int, seeds: Sequence
     scene = side.scenes[number]
     compiled = compile_scene(scene, choices(device), device=device)
     files = {name: side.files.get(name, own) if own else own for name, own in compiled.chosen_files.items()}
-    session = SingleDeviceAccumulation(device, replace(compiled, chosen_files=files), scene.render.size,
-                                       depth_of(scene.render), 0, spp)
+    session = SingleDeviceAccumulation(device, replace(compiled, chosen_files=files), LaunchPlan.of(scene.render, spp))
     rows, dropped = [], 0
     for seed in seeds:
         session.launch["seed"] = seed

@@ -6,7 +6,7 @@ A property generates sides from a scene. The image of each side equals that of t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from ...device.programs.kernel_files import kernel_folder
 from ...scene.geometry.instancing import baked
 from ...scene.geometry.transform import rotation, scaling, transform_mesh, translation
-from ...scene.lights import DirectionalLight, Light
+from ...scene.lights import STRENGTHS, DirectionalLight, Light
 from ...scene.materials.material import Material
 from ...scene.materials.material_types import MATERIALS, Diffuse
 from ...scene.materials.textures import Texture
@@ -132,8 +132,8 @@ def brighter(scene: Scene, factor: float) -> Scene:
     """Return the scene with all light multiplied by a factor; without lights if that is 0."""
     sky, lights = scene.environment, list[Light]()
     for light in scene.lights if factor else ():
-        scaled: dict[str, Any] = {each.name: _scaled(getattr(light, each.name), factor) for each in fields(light)
-                                  if each.name in ("intensity", "irradiance", "radiance")}
+        scaled: dict[str, Any] = {name: _scaled(value, factor) for name, value in vars(light).items()
+                                  if name in STRENGTHS}
         lights.append(replace(light, **scaled))
     environment = replace(sky, strength=sky.strength * factor) if factor else Environment()
     return with_materials(replace(scene, lights=lights, environment=environment), lambda each: _times(each, factor))

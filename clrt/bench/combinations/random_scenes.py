@@ -1,8 +1,8 @@
 """Random scenes that cover the registries: materials, lights, cameras, textures, with all optional fields.
 
 Some objects and instances stand on a floor below a few lights. Scenes of a batch (see Draws) have the same kinds of
-objects and lights, with different positions and intensities. Additions to MATERIALS and LIGHTS, and new fields of
-these, of Texture, Camera and RenderSettings, need no change here.
+objects and lights, with different positions and intensities. Additions to MATERIALS, LIGHTS and CAMERA_TYPES, and new
+fields of these, of Texture, Camera and RenderSettings, need no change here.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Any, get_args
 
 import numpy as np
 
+from ...scene.cameras import CAMERA_TYPES, Projection
 from ...scene.geometry.transform import rotation, scaling, transform_mesh, translation
-from ...scene.lights import LIGHTS, Light, SpotLight
+from ...scene.lights import LIGHTS, Light, SpotLight, fields_of
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
-from ...scene.model import (Camera, Environment, FloatArray, Instance, Mesh, Projection, RenderSettings, Scene,
-                            Sphere, Vector)
+from ...scene.model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere, Vector
 from ..rays.shapes import icosphere
 from .random_draws import Draws
 
@@ -89,9 +89,10 @@ class _Stage:
         height, strength = draws.between(3.4 if draws.moderate else 2.0, 4.4), draws.decades(-0.5, 1.0)
         red, green, blue = (strength * part for part in draws.vector(0.2, 1.0))
         towards = draws.between(-0.8, 0.8) - x, -height, draws.between(-0.8, 0.8) - z
-        light = draws.record(kind, **_known(kind, {
+        light = draws.record(kind, **fields_of(kind, {
             "position": (x, height, z), "direction": towards, "irradiance": (red, green, blue),
-            "intensity": (9 * red, 9 * green, 9 * blue)}))
+            "intensity": (9 * red, 9 * green, 9 * blue), "radius": 0.1 * height,
+            "radiance": (30 * red, 30 * green, 30 * blue)}))
         if isinstance(light, SpotLight) and light.inner_degrees >= light.outer_degrees:
             return replace(light, inner_degrees=0.9 * light.outer_degrees)
         return light
@@ -181,20 +182,16 @@ class _Stage:
     def _camera(self) -> Camera:
         draws = self.draws
         projection = draws.one_of(("perspective", "perspective", "perspective", *get_args(Projection)))
-        far = draws.between(1.4, 2.2) if projection == "equirectangular" else draws.between(4.0, 6.0)
+        far = draws.between(1.4, 2.2) if CAMERA_TYPES[projection].all_around else draws.between(4.0, 6.0)
         turn, elevation = draws.between(-pi, pi), draws.between(0.25, 1.0)
         x, y, z = far * sin(turn) * cos(elevation), far * sin(elevation), far * cos(turn) * cos(elevation)
         lens = projection == "perspective" and draws.chance(0.25)
         radius, focus = draws.between(0.02, 0.15), draws.between(3.0, 6.0)
-        return draws.record(Camera, projection=projection, position=(x, y, z),
-                            look_at=(draws.between(-0.4, 0.4), 0.5, draws.between(-0.4, 0.4)), up=(0.1, 1.0, 0.0),
-                            fov_degrees=draws.between(30, 55), aperture_radius=radius if lens else 0.0,
-                            focus_distance=focus if lens else None, view_height=None)
-
-
-def _known(kind: Any, values: dict[str, Any]) -> dict[str, Any]:
-    """Return those of the values that are fields of a dataclass."""
-    return {each.name: values[each.name] for each in fields(kind) if each.name in values}
+        given = dict(projection=projection, position=(x, y, z),
+                     look_at=(draws.between(-0.4, 0.4), 0.5, draws.between(-0.4, 0.4)), up=(0.1, 1.0, 0.0),
+                     fov_degrees=draws.between(30, 55), aperture_radius=radius if lens else 0.0,
+                     focus_distance=focus if lens else None, view_height=None)
+        return draws.record(Camera, **Camera(projection=projection).unread_fields() | given)
 
 
 def _product(*matrices: Any) -> Any:

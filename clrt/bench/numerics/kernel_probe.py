@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...accel.traversal_kernels import HitTests
+from ...accel.methods import HitTests
 from ...device.launches.device_arrays import empty_array, on_device
 from ...device.launches.launch import run_kernel
 from ...device.open import Device

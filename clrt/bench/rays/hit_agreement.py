@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...accel.traversal_kernels import BUILDER_NAMES, TREELESS, TREES
+from ...accel.methods import TREELESS
+from ...accel.traversal_kernels import BUILDER_NAMES, TREES
 from ...device.discovery.discover import choose, find_devices
 from ...errors import ClrtError, UsageError
 from ...queries.base import TRAVERSALS

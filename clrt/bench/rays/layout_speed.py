@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...accel.traversal_kernels import TREELESS
+from ...accel.methods import TREELESS
 from ...queries.base import TRAVERSALS
 from ...queries.mesh import RayQuery
 from ..interleaved import Contestant, race

@@ -14,7 +14,7 @@ from ...device.open import Device
 from ...device.programs.preamble import typedefs
 from ...device.programs.program import build, make_kernel
 from ...device.programs.struct_types import record
-from ...rendering.accumulation.launch_plan import first_launch
+from ...rendering.accumulation.launch_plan import LaunchPlan
 from ...rendering.accumulation.raster_bins import RasterBins
 from ...rendering.compile.compile_scene import compile_scene
 from ...rendering.film.tiles import TILE_PIXELS, tiles_of
@@ -30,7 +30,7 @@ def seen_both_ways(device: Device, scene: Scene, sample: int = 0, **chosen: Any)
     scene = replace(scene, render=replace(scene.render, integrator="raster"))
     compiled = compile_scene(scene, choices(device, first_hits=True, **chosen), device=device)
     width, height = size = scene.render.size
-    launch = first_launch(compiled, size, 1, scene.render.seed, scene.render.spp)
+    launch = LaunchPlan(size, 1, scene.render.seed, scene.render.spp).record(compiled)
     tiles = np.arange(np.prod(tiles_of(size)), dtype=np.uint32)
     launch["pixel_count"], launch["first_sample"] = len(tiles) * TILE_PIXELS, sample
     arguments = [*(on_device(device, array) for _, array in compiled.buffers.values()), compiled.counts[0]]

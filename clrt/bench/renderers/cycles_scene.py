@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +17,7 @@ from ...errors import UsageError
 from ...output.images import write_image
 from ...rendering.compile.features import biased_by
 from ...scene.geometry.instancing import unfolded
-from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
+from ...scene.lights import DirectionalLight, PointLight, SpotLight
 from ...scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ...scene.materials.textures import untextured
 from ...scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
@@ -29,6 +29,8 @@ NEAR, FAR = 1e-4, 1e6
 SUBDIVISIONS = 6
 #: Power in W of a point light of 1 W/sr in all directions.
 POINT_WATT = 4 * np.pi
+#: Lights with a counterpart.
+Exported = PointLight | DirectionalLight
 
 
 def check_scene(scene: Scene) -> None:
@@ -42,8 +44,7 @@ def check_scene(scene: Scene) -> None:
                              'scattering and smith = "height_correlated"')
         if isinstance(owner.material, Dielectric) and owner.material.features() != {"TRANSMISSION"}:
             raise UsageError(f"{owner.name}: Cycles supports dielectric that is smooth, not thin, and absorbs nothing")
-    if any(isinstance(light, SpotLight) or getattr(light, "range", None) for light in scene.lights):
-        raise UsageError(f"{scene.name}: ranges and spot lights fall off differently in Cycles and are not exported")
+    exported_lights(scene)
     if scene.camera.projection != "perspective" or scene.camera.aperture_radius:
         raise UsageError(f"{scene.name}: only pinhole cameras are exported to Cycles")
     if scene.render.integrator == "local":
@@ -65,7 +66,7 @@ def blender_scene(data: Any, scene: Scene, folder: Path, bsdfs: Mapping[type[Mat
         place(data, made, _mesh(data, mesh.vertices, mesh.faces, mesh.normals, _material(data, mesh.material, bsdfs)))
     for sphere in scene.spheres:
         place(data, made, _mesh(data, *sphere_triangles(sphere), _material(data, sphere.material, bsdfs)))
-    for light in scene.lights:
+    for light in exported_lights(scene):
         place(data, made, *_light(data, light))
     made.camera = place(data, made, *_camera(data, scene.camera))
     made.world = world(data, scene.environment, folder)
@@ -178,13 +179,27 @@ def sphere_triangles(sphere: Sphere) -> tuple[NDArray[Any], NDArray[Any], NDArra
     return np.asarray(sphere.center) + sphere.radius * normals, faces, normals
 
 
-def _light(data: Any, light: Light) -> tuple[Any, NDArray[np.float64]]:
+def exported_lights(scene: Scene) -> list[Exported]:
+    """Return the scene's lights. Raises UsageError for one without a counterpart in Cycles."""
+    found: list[Exported] = []
+    for light in scene.lights:
+        match light:
+            case PointLight(range=None) | DirectionalLight():
+                found.append(light)
+            case PointLight() | SpotLight():
+                raise UsageError(f"{scene.name}: ranges and spot lights fall off differently in Cycles and are not "
+                                 "exported")
+            case _:
+                assert_never(light)
+    return found
+
+
+def _light(data: Any, light: Exported) -> tuple[Any, NDArray[np.float64]]:
     """Return the light, which emits along its −z, and its matrix to the world."""
     if isinstance(light, PointLight):
         made = data.lights.new("light", "POINT")
         made.shadow_soft_size, made.energy, made.color = 0.0, POINT_WATT, light.intensity
         return made, frame_of_axes(np.eye(3), light.position)
-    assert isinstance(light, DirectionalLight)
     made = data.lights.new("light", "SUN")
     made.angle, made.energy, made.color = np.radians(light.angle_degrees), 1.0, light.irradiance
     z = -np.asarray(light.direction) / np.linalg.norm(light.direction)

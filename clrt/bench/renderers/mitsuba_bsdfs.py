@@ -18,8 +18,16 @@ from numpy.typing import NDArray
 from ...errors import UsageError
 from ...formats.images.image_reader import linear_from_srgb
 from ...scene.materials.material import ALPHA_MIN, as_color
-from ...scene.materials.material_types import (BlinnPhong, Conductor, Dielectric, Diffuse, Material,
-                                               MetallicRoughness, Mirror, Phong)
+from ...scene.materials.material_types import (
+    BlinnPhong,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    Material,
+    MetallicRoughness,
+    Mirror,
+    Phong,
+)
 from ...scene.materials.textures import Texture, Wrap, untextured
 from ...scene.model import Mesh, Sphere
 

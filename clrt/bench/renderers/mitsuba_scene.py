@@ -8,7 +8,7 @@ Materials are converted in mitsuba_bsdfs.py.
 from __future__ import annotations
 
 from math import cos, radians, tan
-from typing import Any
+from typing import Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,8 +59,8 @@ def _sensor(scene: Scene, sampler: str) -> Plugin:
     distance = _distance(camera)
     to_world = _frame(camera.position, np.subtract(camera.look_at, camera.position), camera.up)
     lens: Plugin = {"type": "perspective", "fov": camera.fov_degrees, "fov_axis": "y"}
-    if camera.projection == "equirectangular":
-        raise UsageError(f"{scene.name}: Mitsuba has no equirectangular camera")
+    if camera.projection not in ("perspective", "orthographic"):
+        raise UsageError(f"{scene.name}: Mitsuba has no {camera.projection} camera")
     if camera.projection == "orthographic":
         tall = camera.view_height or 2 * distance * tan(radians(camera.fov_degrees) / 2)
         lens = {"type": "orthographic"}    # x from -1 to 1
@@ -127,15 +127,19 @@ def _distance(camera: Camera) -> float:
 
 
 def _light(light: Light, camera: Camera) -> Plugin:
-    if not isinstance(light, DirectionalLight) and light.range is not None:
+    if isinstance(light, PointLight | SpotLight) and light.range is not None:
         raise UsageError("light: ranges are not exported to Mitsuba")
-    if isinstance(light, PointLight):
-        return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
-    if isinstance(light, SpotLight):
-        return _spot(light)
-    if light.angle_degrees:
-        return _sun(light, camera)
-    return {"type": "directional", "direction": list(light.direction), "irradiance": rgb(light.irradiance)}
+    match light:
+        case PointLight():
+            return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
+        case SpotLight():
+            return _spot(light)
+        case DirectionalLight() if light.angle_degrees:
+            return _sun(light, camera)
+        case DirectionalLight():
+            return {"type": "directional", "direction": list(light.direction), "irradiance": rgb(light.irradiance)}
+        case _:
+            assert_never(light)
 
 
 def _sun(light: DirectionalLight, camera: Camera) -> Plugin:

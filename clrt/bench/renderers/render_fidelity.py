@@ -29,8 +29,18 @@ from ...rendering.renderer import Renderer
 from ...scene.materials.material_types import Diffuse, Material
 from ...scene.model import Environment, Mesh, RenderSettings, Scene
 from ...scene.validation.validate import validate
-from .fidelity_suite import (WEBSITE_WIDTH, Floats, Scenario, compressed, files_of, golden, over_white, reduced, shrunk,
-                             tone_mapped)
+from .fidelity_suite import (
+    WEBSITE_WIDTH,
+    Floats,
+    Scenario,
+    compressed,
+    files_of,
+    golden,
+    over_white,
+    reduced,
+    shrunk,
+    tone_mapped,
+)
 
 #: Relative tolerance of a mean beyond the range of the others; smallest fraction of an image that counts as a region.
 MARGIN, LEAST = 0.05, 0.005

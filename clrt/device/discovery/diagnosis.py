@@ -11,7 +11,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from contextlib import suppress
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ def diagnosis() -> dict[str, Any]:
     """
     before = dict(os.environ)    # the next import may change the cache variables
     parts: dict[str, Callable[[], Any]] = {
-        "made": lambda: datetime.now(timezone.utc).isoformat(timespec="seconds"), "system": _system,
+        "made": lambda: datetime.now(UTC).isoformat(timespec="seconds"), "system": _system,
         "versions": _versions, "environment": lambda: _environment(before), "drivers": _drivers, "devices": _devices,
         "cache": _cache, "logs": cache_files.kept_logs}
     return {name: without_names(_told(part)) for name, part in parts.items()}

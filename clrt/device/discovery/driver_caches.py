@@ -25,9 +25,10 @@ def provide_cache_folders() -> None:
     programs_are_closed = not _writable(programs) if programs else home_is_closed
     if not (home_is_closed or programs_are_closed):
         return
-    folder = os.path.join(temporary, f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}")
-    if not _writable(folder):
-        try:
+    own = f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}"
+    folder = next(filter(_writable, [os.path.join(temporary, own), os.path.join(MEMORY, own)]), None)
+    if folder is None:
+        try:    # another user took the names, or there is no room
             full = not _has_room(temporary) and _has_room(MEMORY)
             folder = tempfile.mkdtemp(prefix="clrt-cache-", dir=MEMORY if full else temporary)
         except OSError:

@@ -10,7 +10,7 @@ import hashlib
 import os
 import tempfile
 from contextlib import suppress
-from datetime import datetime, timezone
+from datetime import UTC, datetime
 from pathlib import Path
 
 #: File names of scenes' reference images (bench/convergence/reference.py).
@@ -80,7 +80,7 @@ def write_binary(key: str, binary: bytes) -> None:
 
 def keep_log(kind: str, text: str) -> None:
     """Store the last log of its kind ("build" or "error") for `clrt doctor`, if possible."""
-    when = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    when = datetime.now(UTC).isoformat(timespec="seconds")
     write_file(f"last-{kind}.log", f"{when}\n{text}\n".encode(errors="replace"))
 
 

@@ -139,7 +139,7 @@ def compile_ahead(device: Device, source: str) -> None:
 
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
     """Return the kernel `name` of a program. Raises KernelError if the driver fails only now."""
-    from sqlite3 import Error   # pyopencl imports it at the first kernel
+    from sqlite3 import Error  # pyopencl imports it at the first kernel
 
     try:
         try:

@@ -14,8 +14,7 @@ from ...errors import SceneError
 from ...scene.materials.material_types import Material, MetallicRoughness
 from ...scene.materials.textures import Channel, Picture, Texture, Wrap
 from ..images.image_reader import read_texels
-from . import schema as gltf
-from . import material_schema as looks
+from . import material_schema as looks, schema as gltf
 from .accessors import GltfData
 from .solid_glass import glass
 

@@ -72,7 +72,7 @@ class _Process:
     """Child process that runs scene.decoding. `owner`: the pid that started it; a forked process must not use it."""
 
     def __init__(self) -> None:
-        import subprocess    # most scenes need no decoder
+        import subprocess  # most scenes need no decoder
 
         path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
         self.owner = os.getpid()

@@ -12,7 +12,8 @@ import numpy as np
 
 from ...errors import SceneError
 from ...scene.materials.material import Material
-from ...scene.model import Camera, Environment, Filter, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
+from ...scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
+from ...scene.render_settings import Filter, Integrator
 from ..referenced_files import name_of
 from .lights import environment, light
 from .materials import MaterialReader

@@ -17,7 +17,7 @@ from ...scene.model import FloatArray, Instance, Mesh, Sphere
 from ...scene.validation.validate import index_problems
 from ..models import read_model
 from ..ply import ply_records
-from .materials import ShapeMaterial, MaterialReader, absorbing
+from .materials import MaterialReader, ShapeMaterial, absorbing
 from .primitives import cube, cylinder, disk, rectangle, sphere
 from .textures import Attribute, TextureReader
 from .values import Doubles

@@ -18,7 +18,6 @@ from ...scene.validation.field_types import show, unknown
 from ...scene.validation.limits import Ge, Le
 from .placement import Transform
 
-
 #: Maximum number of instances per table.
 MOST_INSTANCES = 2_000_000
 

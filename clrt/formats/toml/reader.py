@@ -14,8 +14,7 @@ from ...scene.geometry.instancing import meshes_by_id
 from ...scene.lights import LIGHTS, Light
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
 from ...scene.materials.textures import WHITE, Texture
-from ...scene.model import Camera, Environment, Instance, Model, RenderSettings, Scene, Sphere
-from ...scene.model import Origin, Source
+from ...scene.model import Camera, Environment, Instance, Model, Origin, RenderSettings, Scene, Source, Sphere
 from ...scene.provenance import material_of, parts_of
 from ...scene.validation.field_types import field_problems, show, unknown, usable
 from ..images.image_reader import read_picture

@@ -22,8 +22,7 @@ from ...scene.geometry.instancing import meshes_by_id
 from ...scene.materials.material import Material
 from ...scene.materials.material_types import Diffuse
 from ...scene.materials.textures import Picture, Texture
-from ...scene.model import Environment, Instance, Mesh, Scene
-from ...scene.model import Origin, Source
+from ...scene.model import Environment, Instance, Mesh, Origin, Scene, Source
 from ...scene.provenance import material_of, shape_of
 from ...scene.validation.field_types import plain_value
 from ..gltf.glb_writer import mesh_glb

@@ -24,7 +24,7 @@ from ...device.open import Device
 from ...errors import DeviceError, KernelError
 from ..compile.compile_scene import CompiledScene
 from ..film.tiles import TILE_PIXELS
-from .device_worker import WorkerShare, DeviceWorker
+from .device_worker import DeviceWorker, WorkerShare
 from .launch_plan import FEWEST_TILES
 from .scene_on_device import SceneOnDevice
 from .work_queue import WorkQueue
@@ -38,7 +38,7 @@ _log = logging.getLogger(__name__)
 class DevicePool:
     """Workers for a scene compiled for each device. Raises DeviceError, or the last one's KernelError, if none is left.
 
-    launch: see `first_launch`; tiles: maximum number of tiles of a film; before: see `SceneOnDevice`.
+    launches: see `LaunchPlan.record`; tiles: maximum number of tiles of a film; before: see `SceneOnDevice`.
     """
 
     def __init__(self, devices: Sequence[Device], compiled: Sequence[CompiledScene], launches: Sequence[NDArray[Any]],

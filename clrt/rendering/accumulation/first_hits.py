@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...aov_types import AOV_TYPES, aovs_from
 from ...device.programs.preamble import typedefs
 from ...device.programs.struct_types import record
 from ...scene.materials.material_types import Material
@@ -16,25 +17,24 @@ from ..compile.compile_scene import CompiledScene
 from .accumulation import Accumulation
 from .per_pixel_kernel import render_pixels
 
-#: AOVs averaged over each pixel's rays, and AOVs of the ray through its center.
-MEANS = ("albedo", "normal", "geometric_normal")
-OF_THE_MIDDLE = ("position", "depth", "primitive", "object", "material")
 #: Camera rays per pixel.
 SAMPLES = 16
 
 
 def first_hits(session: Accumulation, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
-    """Return the AOVs of MEANS and OF_THE_MIDDLE in `names`, for the scene that the session renders.
+    """Return the AOVs of first hits in `names`, for the scene that the session renders.
 
-    As in docs/aovs.md: (height, width, 3) float32, but depth (height, width) float32 and ids (height, width) int32.
+    As in docs/aovs.md: (height, width, 3) float32, (height, width) with one channel, and ids (height, width) int32.
     Raises KernelError and DeviceError if the device fails.
     """
-    means = [name for name in MEANS if name in names]
+    means, centers = _seen(names)
     source, kind = first_hit_program(session.compiled, names)
     seen = render_pixels(session, source, "first_hit", kind, SAMPLES if means else 0)
-    pictures: dict[str, NDArray[np.generic]] = {name: np.ascontiguousarray(seen[name]) for name in means}
+    pictures: dict[str, NDArray[np.generic]] = {
+        name: np.ascontiguousarray(seen[name] if len(AOV_TYPES[name].channels) == 3 else seen[name][..., 0])
+        for name in means + centers}
     missed = seen["primitive"] < 0
-    if "position" in (kind.names or ()):
+    if "position" in centers:
         pictures |= _places(session, seen["position"].astype(np.float64), missed)
     ids = _ids(session, scene, seen)
     pictures |= {name: np.where(missed, -1, numbers).astype(np.int32) for name, numbers in ids.items()}
@@ -43,17 +43,25 @@ def first_hits(session: Accumulation, scene: Scene, names: Collection[str]) -> d
 
 def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[str, np.dtype[Any]]:
     """Return the program text, with only what `names` needs, and the record that it writes."""
-    lists = {"SEEN_MEANS": [name for name in MEANS if name in names],
-             "SEEN_MIDDLE": ["position"] if {"position", "depth"} & set(names) else []}
+    means, centers = _seen(names)
     fields = {"primitive": "i4", "instance": "i4", "pad": "2i4"}
-    for name in sum(lists.values(), []):
+    for name in means + centers:
         fields |= {name: "3f4", f"pad_{name}": "i4"}
     kind = record(**fields)
-    defines = [f"#define {macro}(X) {' '.join(f'X({name})' for name in listed)}" for macro, listed in lists.items()]
-    bent = "normal" in names and "NORMAL_MAPS" in compiled.features
-    materials = ["bsdf/dispatch.cl"] if bent or "albedo" in names else []
+    defines = [f"#define {macro}(X) {' '.join(f'X({name})' for name in listed)}"
+               for macro, listed in (("SEEN_MEANS", means), ("SEEN_MIDDLE", centers))]
+    reads = {AOV_TYPES[name].reads for name in means + centers}
+    bent = "normal" in reads and "NORMAL_MAPS" in compiled.features
+    materials = ["bsdf/dispatch.cl"] if bent or "bsdf" in reads else []
     return compiled.source_of("aov/first_hit.cl", f"#define SEEN_MATERIALS {len(materials)}",
                               typedefs({"FirstHit": kind}), *defines, SEEN_FILES=materials), kind
+
+
+def _seen(names: Collection[str]) -> tuple[list[str], list[str]]:
+    """Return the AOVs that the kernel computes for `names`, those averaged over a pixel and those of its center."""
+    needed = {*names, "position"} if "depth" in names else set(names)
+    return ([name for name in aovs_from("mean") if name in needed],
+            [name for name in aovs_from("center") if name in needed])
 
 
 def _places(session: Accumulation, seen: NDArray[np.float64],
@@ -62,7 +70,7 @@ def _places(session: Accumulation, seen: NDArray[np.float64],
     camera, frame = session.compiled.camera, session.compiled.frame
     axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
     ahead = seen - camera.position
-    if camera.projection == "equirectangular":
+    if camera.type.all_around:
         depth = np.linalg.norm(ahead, axis=-1) / frame.unit
     else:
         depth = ahead @ (axis / np.linalg.norm(axis)) / frame.unit

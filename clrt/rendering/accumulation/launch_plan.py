@@ -1,12 +1,13 @@
-"""Launch records, and the sizes of an image's first launches."""
+"""What all launches of an image have in common, and the size of the first one."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from numpy.typing import NDArray
 
-from ...accel.traversal_kernels import TREELESS
+from ...accel.methods import TREELESS
 from ...scene.model import RenderSettings
 from ..compile.camera_kernel import launch_record
 from ..compile.compile_scene import CompiledScene
@@ -19,13 +20,29 @@ FIRST_LAUNCH_SAMPLES = 1 << 10
 QUICKLY_MET = 128
 
 
-def first_launch(compiled: CompiledScene, size: tuple[int, int], max_depth: int, seed: int,
-                 planned_spp: int | None) -> NDArray[Any]:
-    """Return the LAUNCH record of an image, without a range of pixels and samples."""
-    launch = launch_record(compiled.camera, size)
-    launch["max_depth"], launch["seed"], launch["block_bits"] = max_depth, seed, block_bits(planned_spp)
-    launch["clamp_direct"], launch["clamp_indirect"] = compiled.clamps
-    return launch
+@dataclass(frozen=True)
+class LaunchPlan:
+    """What all launches of an image have in common. size: (width, height); max_depth: as the integrator counts it;
+    planned_spp: see `block_bits`."""
+
+    size: tuple[int, int]
+    max_depth: int
+    seed: int
+    planned_spp: int | None = None
+
+    @staticmethod
+    def of(settings: RenderSettings, planned_spp: int | None) -> LaunchPlan:
+        """Return the plan of an image with these settings."""
+        depth = min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth
+        return LaunchPlan(settings.size, depth, settings.seed, planned_spp)
+
+    def record(self, compiled: CompiledScene) -> NDArray[Any]:
+        """Return the LAUNCH record of a scene's image, without a range of pixels and samples."""
+        launch = launch_record(compiled.camera, self.size)
+        launch["max_depth"], launch["seed"], launch["block_bits"] = (self.max_depth, self.seed,
+                                                                     block_bits(self.planned_spp))
+        launch["clamp_direct"], launch["clamp_indirect"] = compiled.clamps
+        return launch
 
 
 def first_launch_samples(compiled: CompiledScene) -> int:
@@ -43,8 +60,3 @@ def block_bits(planned_spp: int | None) -> int:
     This is the smallest power of two that covers `planned_spp`; 32, i.e. unlimited, if the sample count is not known.
     """
     return 32 if planned_spp is None else (planned_spp - 1).bit_length()
-
-
-def depth_of(settings: RenderSettings) -> int:
-    """Return the maximum path depth, as the integrator counts it."""
-    return min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth

@@ -17,7 +17,7 @@ from ..film.tiles import TILE_PIXELS, row_by_row, tile_by_tile, tiles_of
 from .checked_loops import check_samples
 from .device_pool import DevicePool
 from .device_worker import DeviceWorker
-from .launch_plan import first_launch
+from .launch_plan import LaunchPlan
 from .local import LocalAccumulation
 from .scene_on_device import SceneOnDevice
 from .single_device import SingleDeviceAccumulation
@@ -97,21 +97,17 @@ class MultiDeviceAccumulation(LocalAccumulation):
         self.work, self._film = work, tile_by_tile(film.pixels)
 
 
-def make_pool(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
-              seed: int, planned_spp: int | None, tiles: int | None = None,
+def make_pool(devices: Sequence[Device], compiled: Sequence[CompiledScene], plan: LaunchPlan,
               before: Sequence[SceneOnDevice] = ()) -> DevicePool:
-    """Return a pool for the image of this size; tiles: the maximum number of tiles of a film, all by default; before:
-    see `SceneOnDevice`."""
-    rows, columns = tiles_of(size)
-    launches = [first_launch(scene, size, max_depth, seed, planned_spp) for scene in compiled]
-    return DevicePool(devices, compiled, launches, tiles or rows * columns, before)
+    """Return a pool for the planned image; before: see `SceneOnDevice`."""
+    rows, columns = tiles_of(plan.size)
+    return DevicePool(devices, compiled, [plan.record(scene) for scene in compiled], rows * columns, before)
 
 
-def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
-                 seed: int, planned_spp: int | None, before: Sequence[SceneOnDevice] = ()) -> LocalAccumulation:
+def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], plan: LaunchPlan,
+                 before: Sequence[SceneOnDevice] = ()) -> LocalAccumulation:
     """Return that of a single device if it has room for the film, else that of a pool; before: see `SceneOnDevice`."""
     if len(devices) == 1:
         with suppress(NoRoomError):
-            return SingleDeviceAccumulation(devices[0], compiled[0], size, max_depth, seed, planned_spp, before)
-    pool = make_pool(devices, compiled, size, max_depth, seed, planned_spp, before=before)
-    return MultiDeviceAccumulation(pool, size)
+            return SingleDeviceAccumulation(devices[0], compiled[0], plan, before)
+    return MultiDeviceAccumulation(make_pool(devices, compiled, plan, before), plan.size)

@@ -19,7 +19,7 @@ from ..film.film import Film
 from ..film.host_memory import HostMemory
 from ..film.tiles import TILE_PIXELS
 from .checked_loops import check_samples
-from .launch_plan import FEWEST_TILES, first_launch, first_launch_samples
+from .launch_plan import FEWEST_TILES, LaunchPlan, first_launch_samples
 from .local import LocalAccumulation
 from .scene_on_device import SceneOnDevice, largest_film
 from .work_queue import WorkQueue
@@ -41,15 +41,15 @@ class _Tiles:
 class SingleDeviceAccumulation(LocalAccumulation):
     """Accumulation of one compiled scene at one size, on one device. Raises NoRoomError if scene or film do not fit."""
 
-    def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,
-                 seed: int, planned_spp: int | None = None, before: Sequence[SceneOnDevice] = ()) -> None:
+    def __init__(self, device: Device, compiled: CompiledScene, plan: LaunchPlan,
+                 before: Sequence[SceneOnDevice] = ()) -> None:
+        size = plan.size
         super().__init__(size)
         film_bytes = size[0] * size[1] * compiled.choices.pixel.itemsize
         if film_bytes > largest_film(device, compiled):
             raise NoRoomError(f"{device.info.name}: a film of {size[0]}x{size[1]} does not fit into a buffer; use a "
                               "smaller --size")
-        launch = first_launch(compiled, size, max_depth, seed, planned_spp)
-        self._scene = SceneOnDevice(device, compiled, launch, film_bytes, before=before)
+        self._scene = SceneOnDevice(device, compiled, plan.record(compiled), film_bytes, before=before)
         self._copies = HostMemory(size[::-1], compiled.choices.pixel)   # everything else has been allocated
         self._launches = Launches(first_launch_samples(compiled))
         with self._scene.allocating():

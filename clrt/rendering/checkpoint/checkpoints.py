@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import CheckpointError, OutputError, UsageError
-from ...file_names import StrPath
 from ...scene.model import Scene
 from ...threads import beside
 from ..compile.choices import Choices
 from .checkpoint_file import FAMILY, check_replaceable, older, read_checkpoint, write_checkpoint
 from .identity import differences, facts_of
+from .policy import CheckpointPolicy
 from .saved_state import KINDS, NO_SENSE, SavedState, from_arrays, to_arrays
 
 #: Minimum time between two checkpoints, as a multiple of the time that writing one takes.
@@ -117,15 +117,15 @@ class Checkpoints:
                          header.get("device"), self._device)
 
 
-def open_checkpoints(path: StrPath | None, resume: bool, seconds: float, scene: Scene, choices: Choices,
+def open_checkpoints(policy: CheckpointPolicy, scene: Scene, choices: Choices,
                      device: str) -> tuple[Checkpoints | None, SavedState | None]:
     """Return a render's checkpoints, if enabled, and the state to resume from, if there is one."""
-    if path is None:
-        if resume:
+    if policy.checkpoint is None:
+        if policy.resume:
             raise UsageError("resume needs a checkpoint; give its file, too")
         return None, None
-    checkpoints = Checkpoints(Path(path), facts_of(scene, choices), device, seconds)
-    if resume:
+    checkpoints = Checkpoints(Path(policy.checkpoint), facts_of(scene, choices), device, policy.checkpoint_seconds)
+    if policy.resume:
         return checkpoints, checkpoints.read(scene.render.size)
     checkpoints.warn_of_another()
     return checkpoints, None

@@ -1,70 +1,85 @@
-"""Program options that a device or a user chooses, in addition to what the scene requires."""
+"""How an image is computed, in addition to what the scene requires: choices of a device or a user."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import numpy as np
+from ...accel.methods import TREELESS, BuilderName, HitTests, LayoutName
+from ...errors import UsageError
+from ...option_fields import check_values, option
 
-from ...accel.traversal_kernels import BUILDER_NAMES, TREELESS, TREES, HitTests
-from ...device.open import Device
-from ...errors import UsageError, check_choice
-from .records import PIXEL, PIXEL_WITH_DIRECT
+if TYPE_CHECKING:
+    import numpy as np
 
+    from ...device.open import Device
+
+Lanes = Literal[1, 8, 16]
+#: "lanes" is the megakernel, one path per lane (kernels/integrator/path.cl); "waves" the wavefront, which advances many
+#: paths together by one vertex at a time (kernels/integrator/wavefront.cl).
+Paths = Literal["lanes", "waves"]
+Offset = Literal["bound", "ulp", "fixed"]
+#: SIMD widths: paths per work-item; and the one that the wavefront needs.
+LANES, WAVE_LANES = get_args(Lanes), 8
 #: Kernel files of the methods to offset ray origins from surfaces.
-OFFSETS = {"bound": "offset/bound.cl", "ulp": "offset/ulp.cl", "fixed": "offset/fixed.cl"}
-#: Path modes ("lanes" is the megakernel, "waves" the wavefront), and the SIMD width that the wavefront needs.
-PATHS, WAVE_LANES = ("lanes", "waves"), 8
-#: SIMD widths: paths per work-item.
-LANES = (1, 8, 16)
+OFFSETS = {name: f"offset/{name}.cl" for name in get_args(Offset)}
 
 
 @dataclass(frozen=True)
 class Choices:
-    """Program options. lanes: see LANES; offset: see OFFSETS; direct_light: whether the film stores it separately.
+    """How an image is computed; what is None suits the device (see `on`) or the scene.
 
-    paths: "lanes" for the megakernel, one path per lane (kernels/integrator/path.cl), or "waves" for the wavefront,
-    which advances many paths together by one vertex at a time (kernels/integrator/wavefront.cl); None for the wavefront
-    if there are 8 lanes, as it needs. layout: a name in TREES, or None for the one that fits the device and the scene.
-    tree: False for brute force (no BVH), True for a BVH even for few primitives; None for the faster one. first_hits:
-    whether first hits are requested along with the image, as AOVs, by a denoiser or by a user: then rays are traced
-    whatever the integrator does. Raises UsageError for unknown values and for options that exclude each other.
+    direct_light: whether the film stores it separately. Raises UsageError for unknown values and for options that
+    exclude each other.
     """
 
-    lanes: int = 8
-    layout: str | None = None
-    builder: str | None = None
+    lanes: int | None = option(None, "SIMD width: paths per work-item.", LANES)
+    layout: str | None = option(
+        None, "BVH layout; packs (for small scenes) and list use no BVH.", get_args(LayoutName))
+    builder: str | None = option(
+        None, "BVH builder; default: sah for small scenes, ploc on the device for large ones.", get_args(BuilderName))
     tests: HitTests = HitTests()
-    offset: str = "bound"
+    offset: str = option(
+        "bound", "Offset of ray origins from the surface: its rounding error bound, a few ulps, or 0.001.", OFFSETS)
     direct_light: bool = False
-    paths: str | None = None
-    tree: bool | None = None
-    first_hits: bool = False
+    paths: str | None = option(
+        None, "lanes: megakernel; waves: wavefront with compaction (needs 8 lanes). Default: by device.",
+        get_args(Paths))
+    tree: bool | None = option(
+        None, "Use a BVH, or intersect every ray with all primitives (brute force); default: the faster.",
+        (True, False))
+    first_hits: bool = option(
+        False, "Whether first hits will be requested later, as AOVs, by a denoiser or by a user: then rays are traced "
+               "whatever the integrator does.", (True, False))
 
     def __post_init__(self) -> None:
-        known: dict[str, tuple[object, ...]] = {"layout": (None, *TREES), "builder": (None, *BUILDER_NAMES),
-                                                "lanes": LANES, "paths": (None, *PATHS), "offset": tuple(OFFSETS),
-                                                "tree": (None, True, False), "first_hits": (True, False)}
-        for name, values in known.items():
-            check_choice(name, getattr(self, name), values)
-        if self.paths == "waves" and self.lanes != WAVE_LANES:
+        check_values(self)
+        if self.paths == "waves" and self.lanes not in (None, WAVE_LANES):
             raise UsageError(f"paths = waves needs {WAVE_LANES} lanes, not {self.lanes}; leave out one of them")
         if self.tree is not None and self.layout is not None and self.tree == (self.layout in TREELESS):
             raise UsageError(f"the layout {self.layout} is {'not ' * self.tree}a BVH, and tree is "
                              f"{'on' if self.tree else 'off'}; leave out one of them")
 
     @property
-    def waves(self) -> bool:
-        """Whether paths are traced in wavefront mode."""
-        return self.lanes == WAVE_LANES and self.paths != "lanes"
-
-    @property
     def pixel(self) -> np.dtype[Any]:
         """Record type of a film pixel."""
+        from .records import PIXEL, PIXEL_WITH_DIRECT
+
         return PIXEL_WITH_DIRECT if self.direct_light else PIXEL
 
+    def on(self, device: Device | None) -> ResolvedChoices:
+        """Return the choices with SIMD width and paths as they suit the device; without one, as they suit a CPU.
 
-def choices_on(device: Device, asked: Choices, lanes: int | None) -> Choices:
-    """Return the requested options, with the device's preferences for those left open."""
-    return replace(asked, lanes=lanes or device.lanes, paths=asked.paths or (None if device.packs else "lanes"))
+        Raises UsageError if the device's SIMD width excludes the chosen paths.
+        """
+        lanes = self.lanes or (device.lanes if device else WAVE_LANES)
+        by_device: Paths = "waves" if lanes == WAVE_LANES and (device is None or device.packs) else "lanes"
+        return ResolvedChoices(**{**vars(self), "lanes": lanes, "paths": self.paths or by_device})
+
+
+@dataclass(frozen=True)
+class ResolvedChoices(Choices):
+    """Choices on one device: only layout, builder and tree may be open, which depend on the scene, too."""
+
+    lanes: int = WAVE_LANES
+    paths: str = "waves"

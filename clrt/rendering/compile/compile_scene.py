@@ -19,7 +19,7 @@ from ...scene.geometry.scaling import SceneFrame, camera_in
 from ...scene.model import Camera, Scene
 from ...scene.validation.validate import validate
 from ..film.tiles import TILE_PIXELS
-from .choices import Choices
+from .choices import Choices, ResolvedChoices
 from .compile_ahead import begin_program
 from .features import WITH_LIGHT, features_of, files_for, preamble_of
 from .geometry.pack_instances import ObjectIds
@@ -49,7 +49,7 @@ class CompiledScene:
     chosen_files: dict[str, list[str]]
     entry: str
     tree: Layout
-    choices: Choices
+    choices: ResolvedChoices
     camera: Camera
     frame: SceneFrame
     instances: int
@@ -107,10 +107,11 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     """Validate and pack `scene` for the kernel file `entry`. Raises SceneError listing everything that is wrong with
     it.
 
-    entry: None for the scene's integrator; device: where large BVHs are built, if given; carried: results that can be
-    reused from the previous scene; ahead: whether its program will be built on that device.
+    entry: None for the scene's integrator; device: where large BVHs are built, and which open choices suit, if given;
+    carried: results that can be reused from the previous scene; ahead: whether its program will be built on the device.
     """
     validate(scene)
+    choices = choices.on(device)
     if ahead and device is not None:
         begin_program(scene, choices, device, lambda scene, choices: compile_scene(scene, choices).source)
     packed = pack_scene(scene, choices, device, carried or ReuseCache())
@@ -118,7 +119,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     part_bytes = needed_parts((array for _, array in packed.buffers.values()), device.info) if device else None
     if entry is None:
         integrator = scene.render.integrator
-        in_waves = integrator in WITH_LIGHT and choices.waves and "LOOP_LIMIT" not in features
+        in_waves = integrator in WITH_LIGHT and choices.paths == "waves" and "LOOP_LIMIT" not in features
         entry = RASTER if integrator == "raster" else WAVEFRONT if in_waves else MEGAKERNEL
     return CompiledScene(packed.buffers, packed.counts, sorted(features),
                          preamble_of(packed, choices, features, part_bytes), files_for(packed, choices, features),

@@ -12,8 +12,8 @@ from ...scene.materials.textures import Texture
 from ...scene.model import RenderSettings
 from ..film.tiles import TILE
 from .camera_kernel import camera_file
-from .choices import OFFSETS, Choices
-from .lights.pack_lights import SURFACES, TYPES
+from .choices import OFFSETS, Choices, ResolvedChoices
+from .lights.light_types import SURFACES, TYPES
 from .pack_scene import PackedScene
 from .pixel_filters import filter_reach
 from .records import COUNTS, GUIDE, LAUNCH, OUTLINE
@@ -40,7 +40,7 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
     local = scene.render.integrator in ("local", "raster")
     features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
     features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
-    features |= set().union(*(material.features() for material in packed.shapes.users))
+    features |= set().union(emitters.features, *(material.features() for material in packed.shapes.users))
     has = {**tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone, packed.tree is not NO_RAYS),
            "SPHERES": bool(scene.spheres), "INSTANCES": bool(scene.instances),
            "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes),
@@ -51,7 +51,6 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
            "SKY": packed.sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
            "EMITTERS": any(t in SURFACES for t in emitters.types),
            "DOUBLE_SIDED_LIGHTS": any(user.double_sided and any(user.radiance) for user in packed.shapes.users),
-           "LIGHT_RANGES": any(getattr(light, "range", None) for light in scene.lights),
            "LOCAL": local, "NO_SHADOWS": local and not scene.render.shadows,
            "RASTER": scene.render.integrator == "raster", "PIXEL_MIDDLE": scene.render.integrator == "depth",
            "CAMERA_CULLING": (scene.render.back_face_culling == "camera"
@@ -62,7 +61,7 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
     return features | {name for name, present in has.items() if present}
 
 
-def preamble_of(packed: PackedScene, choices: Choices, features: set[str], part_bytes: int | None) -> str:
+def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str], part_bytes: int | None) -> str:
     """Return the definitions that precede all kernel files. part_bytes: see CompiledScene."""
     emitters, materials = packed.emitters, packed.materials
     # Only programs that use lengths in scene units depend on the unit: all others are shared between units.

@@ -25,7 +25,7 @@ from .geometry.pack_instances import ObjectIds, PackedInstances
 from .geometry.vertex_attributes import pack_corners
 from .lights.environment_map import EnvironmentMap
 from .lights.pack_lights import PackedLights, pack_emitters
-from .materials.pack_materials import PackedMaterials, MaterialTables, pack_materials
+from .materials.pack_materials import MaterialTables, PackedMaterials, pack_materials
 from .materials.pack_textures import PackedTextures
 from .pixel_filters import filter_quantiles
 from .records import COUNTS

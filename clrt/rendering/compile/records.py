@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...device.programs.struct_types import record
+from .lights.light_types import TYPES
 
 TRIANGLE = record(p0="3f4", material="i4", p1="3f4", light="i4", p2="3f4", normals="i4")
 NORMALS = record(n0="3f4", pad0="i4", n1="3f4", pad1="i4", n2="3f4", pad2="i4")
@@ -32,21 +33,14 @@ TRIANGLE_LIGHT = record(p0="3f4", area="f4", e1="3f4", parallelogram="i4", e2="3
 #: sphere: its number among the spheres.
 SPHERE_LIGHT = record(center="3f4", radius="f4", radiance="3f4", texture="i4", sphere="i4", double_sided="i4",
                       pad="2i4")
-#: per_range2: 1 over the square of its range, 0 without one.
-POINT_LIGHT = record(position="3f4", pad="i4", intensity="3f4", per_range2="f4")
-#: outer: 1 − the cosine of the outer cone's angle; slope: 1 over the difference to that of the inner cone.
-SPOT_LIGHT = record(position="3f4", outer="f4", axis="3f4", slope="f4", intensity="3f4", per_range2="f4")
-DIRECTIONAL_LIGHT = record(towards="3f4", pad0="i4", irradiance="3f4", pad1="i4")
-#: height: 1 − the cosine of half its angular diameter.
-SUN_LIGHT = record(towards="3f4", height="f4", radiance="3f4", pad="i4")
 
 ENVIRONMENT = record(color="3f4", pad="f4", width="i4", height="i4", rotation_cos="f4", rotation_sin="f4")
 SKY_TEXEL = record(radiance="3f4", density="f4")
 #: Fields are read one at a time, so records of half the size cost nothing: two of them share 16 bytes.
 SKY_STEP = np.dtype([("top", "f4"), ("start", "i4")])
 
-COUNTS = record(triangles="i4", spheres="i4", lights="i4", triangle_lights="i4", sphere_lights="i4", point_lights="i4",
-                spot_lights="i4", directional_lights="i4", sun_lights="i4", sky_lights="i4", pad="2i4")
+_COUNTED = ("triangles", "spheres", "lights", *(f"{kind}_lights" for kind in TYPES))
+COUNTS = record(**dict.fromkeys(_COUNTED, "i4"), pad=f"({-len(_COUNTED) % 4 or 4},)i4")
 #: clamped: if CLAMP is compiled in, the radiance that clamping removed from the samples, averaged over channels.
 PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4", rays="u4", square_error="3f4",
                clamped="f4")
@@ -74,8 +68,8 @@ LAYER_PARTS = record(part="8f4")
 FILTER = np.dtype([("quantile", "f4")])
 
 
-def material_record(values: Iterable[Mapping[str, Any]]) -> np.dtype[Any]:
-    """Return the record of materials of one type, with these values by name: the union over all of them.
+def parameter_record(values: Iterable[Mapping[str, Any]]) -> np.dtype[Any]:
+    """Return the record of materials or lights of one type, with these values by name: the union over all of them.
 
     Rows of a multiple of four come first, as long as the longest, then triples, each followed by a scalar or padding,
     then the other scalars; texture numbers are int32.

@@ -26,15 +26,15 @@ class SceneCompiler:
     def __init__(self, devices: Sequence[Device]) -> None:
         self.devices = list(devices)
         self._carried = [ReuseCache() for _ in devices]
-        self._last: tuple[Scene, list[Choices], list[CompiledScene]] | None = None
+        self._last: tuple[Scene, Choices, list[CompiledScene]] | None = None
 
     @classmethod
     def after(cls, last: SceneCompiler | None, devices: Sequence[Device]) -> SceneCompiler:
         """Return the last compiler if it is for the same devices, else a new one."""
         return last if last and last.devices == devices else cls(devices)
 
-    def compile(self, scene: Scene, choices: list[Choices], ahead: bool = False) -> list[CompiledScene]:
-        """Return the scene compiled for each device with its choices; ahead: see `compile_scene`.
+    def compile(self, scene: Scene, choices: Choices, ahead: bool = False) -> list[CompiledScene]:
+        """Return the scene compiled for each device; ahead: see `compile_scene`.
 
         If everything but the camera and PASSING settings is the identical object as before, only these are updated.
         """
@@ -48,14 +48,14 @@ class SceneCompiler:
         self._last = scene, choices, compiled
         return compiled
 
-    def _anew(self, scene: Scene, choices: list[Choices], ahead: bool) -> list[CompiledScene]:
+    def _anew(self, scene: Scene, choices: Choices, ahead: bool) -> list[CompiledScene]:
         """Compile once for devices with equal properties, unless BVHs were built on a device."""
         compiled: list[CompiledScene] = []
-        for choice, device, carried in zip(choices, self.devices, self._carried):
-            alike = [done for done, other, chosen in zip(compiled, self.devices, choices) if chosen == choice
+        for device, carried in zip(self.devices, self._carried):
+            alike = [done for done, other in zip(compiled, self.devices) if done.choices == choices.on(device)
                      and (other.layout, other.info.max_alloc_bytes) == (device.layout, device.info.max_alloc_bytes)
                      and all(isinstance(array, np.ndarray) for _, array in done.buffers.values())]
-            compiled.append(alike[0] if alike else compile_scene(scene, choice, device=device, carried=carried,
+            compiled.append(alike[0] if alike else compile_scene(scene, choices, device=device, carried=carried,
                                                                  ahead=ahead))
         return compiled
 

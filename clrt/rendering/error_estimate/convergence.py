@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..accumulation.accumulation import Accumulation
+from ..cancellation import NEVER, CancellationToken
 from ..checkpoint.saved_state import SavedState
 from ..film.film import Film
-from ..film.row_bands import Cancelled
 from ..film.state import State, relmse
 from ..film.tiles import mean_samples
 from .adaptive_sampling import tiles_to_double
@@ -33,11 +32,13 @@ class Convergence:
         self.noise, self.history = kept.noise, kept.history
 
     def state(self, film: Film, tile_samples: NDArray[np.int64], seconds: float, reference: NDArray[np.float32] | None,
-              in_haste: bool) -> State:
+              in_haste: bool, token: CancellationToken = NEVER) -> State:
         """Return the state of the film, given the samples (rows, columns) of each tile and the elapsed seconds. If
-        `in_haste`, the error estimate is not updated with this film."""
+        `in_haste`, the error estimate is not updated with this film. Raises Cancelled by the token."""
         if not in_haste:
-            self.noise.add(film, tile_samples)
+            self.noise.add(film, tile_samples, token)
+            if film.has_variance:
+                film.relative_variance(token)
         noise = self.noise.at(self.last.film if in_haste and self.history else film, tile_samples)
         of_tiles = self.noise.of_tiles(tile_samples, film.size, self._percentile)
         spp = mean_samples(tile_samples, film.size)
@@ -45,24 +46,14 @@ class Convergence:
         return self.last
 
     def record(self, film: Film, tile_samples: NDArray[np.int64], seconds: float,
-               reference: NDArray[np.float32] | None = None, in_haste: bool = False) -> State:
-        """Return the state, and append it to the history unless `in_haste`."""
-        state = self.state(film, tile_samples, seconds, reference, in_haste)
+               reference: NDArray[np.float32] | None = None, in_haste: bool = False,
+               token: CancellationToken = NEVER) -> State:
+        """Return the state, and append it to the history unless `in_haste`. Raises Cancelled by the token."""
+        state = self.state(film, tile_samples, seconds, reference, in_haste, token)
         entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
         if not in_haste:
             self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
         return state
-
-    def record_if_wanted(self, film: Film, tile_samples: NDArray[np.int64], seconds: float,
-                         reference: NDArray[np.float32] | None, unwanted: Callable[[], bool]) -> State | None:
-        """Like `record`, but return None as soon as `unwanted` returns True."""
-        film.unwanted = unwanted
-        try:
-            return self.record(film, tile_samples, seconds, reference)
-        except Cancelled:
-            return None
-        finally:
-            del film.unwanted   # avoids a reference cycle
 
     def tiles_to_double(self, tile_samples: NDArray[np.int64], spp: int | None) -> NDArray[np.intp]:
         """Return `adaptive.tiles_to_double` for the newest state."""

@@ -7,6 +7,7 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cancellation import NEVER, CancellationToken
 from ..film.film import Film
 from ..film.row_bands import in_bands
 from ..film.tiles import over_pixels, tile_pixels, tile_sums
@@ -56,8 +57,9 @@ class NoiseEstimate:
         """Resume from the result of `arrays`."""
         self._mean, self._changes, self._level = mean if mean.size else None, list(changes), level
 
-    def add(self, film: Film, tile_samples: NDArray[np.int64]) -> None:
-        """Add the film, with samples (rows, columns) of each tile; only tiles at the next power of two are used."""
+    def add(self, film: Film, tile_samples: NDArray[np.int64], token: CancellationToken = NEVER) -> None:
+        """Add the film, with samples (rows, columns) of each tile; only tiles at the next power of two are used. Raises
+        Cancelled by the token."""
         mean = film.mean
         if self._mean is None:
             self._mean, self._level = np.zeros_like(mean, np.float32), np.full(tile_samples.shape, -1)
@@ -66,10 +68,10 @@ class NoiseEstimate:
             return
         before, level = self._mean, self._level[due]
         if level.max() >= 0:    # the first sample is not a change
-            relative = film.relative_to
+            relative, limits = film.relative_variance(token)
             change = np.concatenate(in_bands(
-                mean.shape, lambda rows: tile_sums(((mean[rows] - before[rows]) / relative[rows]) ** 2), film.unwanted))
-            both = np.stack([change, film.tile_limits])
+                mean.shape, lambda rows: tile_sums(((mean[rows] - before[rows]) / relative[rows]) ** 2), token))
+            both = np.stack([change, limits])
         self._changes += [np.full((2, *due.shape), np.nan) for _ in range(max(level) + 1 - len(self._changes))]
         for k in sorted({*level.tolist()} - {-1}):
             at_k = due & (self._level == k)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cancellation import NEVER, CancellationToken
 from .expected_radiance import REACH, expected
 from .row_bands import in_bands
 from .tiles import TILE, tile_sums
@@ -35,13 +35,11 @@ def _padded(values: NDArray[np.float64], rows: tuple[int, int]) -> NDArray[np.fl
 
 
 class Film:
-    """Host copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT; `unwanted` is polled
-    during error estimation, which raises `Cancelled` once it returns True."""
-
-    unwanted: Callable[[], bool] = staticmethod(lambda: False)
+    """Host copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT."""
 
     def __init__(self, pixels: NDArray[Any]) -> None:
         self.pixels = pixels
+        self._relative: tuple[NDArray[np.float32], NDArray[np.float64]] | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -97,7 +95,7 @@ class Film:
     def relative_to(self) -> NDArray[np.float32]:
         """(height, width, 3): denominator of errors in relMSE, √(expected² + 0.01), with an estimate of the expected
         value (rendering/film/expected_radiance.py)."""
-        return self._judged[0]
+        return self.relative_variance()[0]
 
     @cached_property
     def noise(self) -> float | None:
@@ -105,19 +103,27 @@ class Film:
 
         None before every pixel has two samples.
         """
+        return float(np.sqrt(np.sum(self.tile_limits) / self.mean.size)) if self.has_variance else None
+
+    @cached_property
+    def has_variance(self) -> bool:
+        """Whether every pixel has two samples."""
         count = self.pixels["count"]
-        if not count.size or count.min() < 2:
-            return None
-        return float(np.sqrt(np.sum(self.tile_limits) / self.mean.size))
+        return bool(count.size) and bool(count.min() >= 2)
 
     @property
     def tile_limits(self) -> NDArray[np.float64]:
         """(rows, columns): Var[mean] / (expected² + 0.01), summed over a tile's values; NaN below two samples."""
-        return self._judged[1]
+        return self.relative_variance()[1]
 
-    @cached_property
-    def _judged(self) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-        """`relative_to` and `tile_limits`, computed together since they share intermediate results."""
+    def relative_variance(self, token: CancellationToken = NEVER) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """Return `relative_to` and `tile_limits`, computed once, and together since they share intermediate results.
+        Raises Cancelled by the token."""
+        if self._relative is None:
+            self._relative = self._relative_variance(token)
+        return self._relative
+
+    def _relative_variance(self, token: CancellationToken) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
         mean, height = self.mean, len(self.mean)
         relative = np.empty_like(mean, np.float32)
 
@@ -129,7 +135,7 @@ class Film:
             relative[rows] = np.sqrt(squared)
             return tile_sums(variance[rows.start - there.start:][:rows.stop - rows.start] / squared)
 
-        return relative, np.concatenate(in_bands(mean.shape, judge, self.unwanted))
+        return relative, np.concatenate(in_bands(mean.shape, judge, token))
 
     @property
     def clamped_part(self) -> float:

@@ -6,16 +6,13 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from ...threads import in_parallel
+from ..cancellation import NEVER, CancellationToken
 from .tiles import TILE
 
 #: Approximate pixels per band: small enough for intermediate arrays to reuse memory already allocated. Larger ones are
 #: newly mapped by the system each time, which took longer than all sums.
 PIXELS = 1 << 15
 T = TypeVar("T")
-
-
-class Cancelled(Exception):
-    """Raised if the result of a computation is no longer needed."""
 
 
 def bands_of(size: tuple[int, ...]) -> list[slice]:
@@ -25,13 +22,10 @@ def bands_of(size: tuple[int, ...]) -> list[slice]:
     return [slice(first, min(first + step, height)) for first in range(0, height, step)]
 
 
-def in_bands(size: tuple[int, ...], work: Callable[[slice], T], unwanted: Callable[[], bool] = lambda: False,
-             ) -> list[T]:
-    """Return the results of `work` for the rows of each band, run in parallel. Raises Unwanted once `unwanted` is true.
-    """
-    def wanted(rows: slice) -> T:
-        if unwanted():
-            raise Cancelled
+def in_bands(size: tuple[int, ...], work: Callable[[slice], T], token: CancellationToken = NEVER) -> list[T]:
+    """Return the results of `work` for the rows of each band, run in parallel; the token is checked before each."""
+    def checked(rows: slice) -> T:
+        token.check()
         return work(rows)
 
-    return in_parallel(wanted, bands_of(size))
+    return in_parallel(checked, bands_of(size))

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import frexp
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lights import DirectionalLight, Light
+from ..lights import Light
 from ..model import Camera, Instance, Mesh, Scene, Sphere, Vector
 from .instancing import meshes_by_id
 
@@ -119,9 +119,8 @@ def _instances(instances: list[Instance], frame: SceneFrame) -> list[Instance]:
 
 def camera_in(camera: Camera, frame: SceneFrame) -> Camera:
     """Return a camera in a frame."""
-    focus, height = (length and length * frame.unit for length in (camera.focus_distance, camera.view_height))
-    return replace(camera, position=frame.point(camera.position), look_at=frame.point(camera.look_at),
-                   aperture_radius=camera.aperture_radius * frame.unit, focus_distance=focus, view_height=height)
+    return replace(camera.scaled(frame.unit), position=frame.point(camera.position),
+                   look_at=frame.point(camera.look_at))
 
 
 def _sphere(sphere: Sphere, frame: SceneFrame) -> Sphere:
@@ -130,8 +129,5 @@ def _sphere(sphere: Sphere, frame: SceneFrame) -> Sphere:
 
 
 def _light(light: Light, frame: SceneFrame) -> Light:
-    if isinstance(light, DirectionalLight):
-        return light
-    red, green, blue = (value * frame.unit**2 for value in light.intensity)
-    return replace(light, position=frame.point(light.position), intensity=(red, green, blue),
-                   range=light.range and light.range * frame.unit)
+    moved: dict[str, Any] = {name: frame.point(value) for name, value in vars(light).items() if name == "position"}
+    return replace(light.in_unit(frame.unit), **moved)

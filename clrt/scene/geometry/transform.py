@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..lights import DirectionalLight, Light, PointLight
+from ..lights import Light
 from ..model import Camera, Mesh, Vector
 
 Matrix = NDArray[np.float64]
@@ -84,22 +85,19 @@ def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
     corners = np.array([[*camera.position, 1], [*camera.look_at, 1], [*camera.up, 0]]) @ matrix.T
     position, look_at, up = corners[:, :3].tolist()
     stretch = float(np.linalg.norm(up) / np.linalg.norm(camera.up))
-    focus, height = (length and length * stretch for length in (camera.focus_distance, camera.view_height))
-    return replace(camera, position=position, look_at=look_at, up=up, focus_distance=focus, view_height=height,
-                   aperture_radius=camera.aperture_radius * stretch)
+    return replace(camera.scaled(stretch), position=position, look_at=look_at, up=up)
 
 
 def transform_light(light: Light, matrix: Matrix) -> Light:
-    """Return the light under an affine `matrix`, moved and rotated; its strength and range are kept, as in glTF."""
-    turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    if not isinstance(light, PointLight):
-        x, y, z = unit(matrix[:3, :3] @ light.direction).tolist()
-        turned = x, y, z
-        if isinstance(light, DirectionalLight):
-            return replace(light, direction=turned)
-    x, y, z = (matrix[:3] @ [*light.position, 1.0]).tolist()
-    moved = replace(light, position=(x, y, z))
-    return moved if isinstance(moved, PointLight) else replace(moved, direction=turned)
+    """Return the light under an affine `matrix`, moved and rotated; its size, strength and range are kept, as in glTF.
+    """
+    changed: dict[str, Any] = {}
+    for name, value in vars(light).items():
+        if name == "position":
+            changed[name] = tuple((matrix[:3] @ [*value, 1.0]).tolist())
+        elif name == "direction":
+            changed[name] = tuple(unit(matrix[:3, :3] @ value).tolist())
+    return replace(light, **changed)
 
 
 def transform_faults(to_world: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:

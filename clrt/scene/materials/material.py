@@ -3,30 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Self
 
+from ..render_settings import Culling
 from ..validation.limits import Ge, Le
+from ..validation.tuples import tuples_for_lists
 from .textures import NonNegative, Texture
 
 Unit = Annotated[float, Ge(0), Le(1)]
 Albedo = tuple[Unit, Unit, Unit]
 Radiance = tuple[NonNegative, NonNegative, NonNegative]
 Parameter = float | tuple[float, ...] | Texture
-#: Rays for which back faces are invisible (`RenderSettings.back_face_culling`).
-Culling = Literal["none", "camera", "all"]
 
 #: Below this alpha GGX exceeds float32 (D ~ 1/(pi alpha²)), also in the kernel; use `Mirror` for perfect reflection.
 ALPHA_MIN = 1e-4
-
-
-def tuples_for_lists(record: Any) -> None:
-    """Convert a dataclass's lists and arrays of numbers to tuples, so that either may be given and it is hashable."""
-    for field in fields(record):
-        value = getattr(record, field.name)
-        if hasattr(value, "tolist"):
-            value = value.tolist()
-        if isinstance(value, list):
-            object.__setattr__(record, field.name, tuple(value))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -111,14 +111,19 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
         if not (isinstance(value, str) and value in parts):
             yield f"{path}: {show(value)} {unknown(value, parts)}"
     elif origin is tuple and isinstance(value, tuple):
-        kinds = (parts[0],) * len(value) if parts[-1] is ... else parts
-        if len(value) <= len(kinds):
-            for i, (kind, entry) in enumerate(zip(kinds, value)):
-                yield from _problems(kind, entry, f"{path}[{i}]")
-        if len(value) != len(kinds):
-            yield f"{path}: {show(value)} has {len(value)} entries; write {len(kinds)}"
+        yield from _tuple_problems(parts, value, path)
     elif hint is not Any and (fault := _fault(origin or hint, value)):
         yield f"{path}: {show(value)} {fault}"
+
+
+def _tuple_problems(parts: tuple[Any, ...], value: tuple[Any, ...], path: str) -> Iterator[str]:
+    """Yield the problems of a tuple and of its entries; parts: their types, or one type and an ellipsis."""
+    kinds = (parts[0],) * len(value) if parts[-1] is ... else parts
+    if len(value) <= len(kinds):
+        for i, (kind, entry) in enumerate(zip(kinds, value)):
+            yield from _problems(kind, entry, f"{path}[{i}]")
+    if len(value) != len(kinds):
+        yield f"{path}: {show(value)} has {len(value)} entries; write {len(kinds)}"
 
 
 def _floats(hint: Any, value: Any) -> Any:

@@ -12,7 +12,7 @@ from ...errors import SceneError, UsageError
 from ..animation import Animation
 from ..camera_path import animation_problems
 from ..geometry.instancing import painted
-from ..lights import LIGHTS, PointLight, SpotLight
+from ..lights import LIGHTS
 from ..materials.material_types import MATERIALS, Diffuse, Material
 from ..model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere
 from .field_types import field_problems, show
@@ -225,11 +225,8 @@ def _camera_problems(camera: Camera) -> list[str]:
     right = np.cross(forward / np.abs(forward).max(), up / np.abs(up).max())
     if np.linalg.norm(right) < 1e-6:
         return [f"camera.up: {show(camera.up)} is parallel to the view direction; write another, such as [0, 0, -1]"]
-    given = {"aperture_radius": camera.aperture_radius or None, "focus_distance": camera.focus_distance,
-             "view_height": camera.view_height}
-    return [f'camera.{name}: {show(value)} has no effect with projection = "{camera.projection}"; leave it out'
-            for name, value in given.items() if value is not None
-            and camera.projection != ("orthographic" if name == "view_height" else "perspective")]
+    return [f'camera.{name}: {show(getattr(camera, name))} has no effect with projection = "{camera.projection}"; '
+            'leave it out' for name, default in camera.unread_fields().items() if getattr(camera, name) != default]
 
 
 def _raster_problems(scene: Scene) -> list[str]:
@@ -266,11 +263,5 @@ def _environment_problems(environment: Environment) -> list[str]:
 def _light_problems(light: object, where: str) -> list[str]:
     if not isinstance(light, LIGHTS):
         return [f"{where}: {show(light)} is not a light; write a {' or '.join(kind.__name__ for kind in LIGHTS)}"]
-    if problems := _object_problems(light, type(light), where):
-        return problems
-    if not isinstance(light, PointLight) and not any(light.direction):
-        problems.append(f"{where}.direction: [0, 0, 0] is not a direction; write the one the light travels in")
-    if isinstance(light, SpotLight) and light.inner_degrees >= light.outer_degrees:
-        problems.append(f"{where}.inner_degrees: {light.inner_degrees:g} is not below outer_degrees, "
-                        f"{light.outer_degrees:g}; write a smaller angle")
-    return problems
+    problems = _object_problems(light, type(light), where)
+    return problems or [f"{where}.{conflict}" for conflict in light.conflicts()]

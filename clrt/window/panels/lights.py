@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui
 
-from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
+from ...scene.lights import LIGHTS, Light, fields_of
 from ...scene.model import Camera, Environment
 from ..editor import ROUND, Editor
 from ..fields import edit_fields
@@ -14,6 +14,8 @@ from ..navigation import distance
 
 #: Irradiance of a new light at the camera's look_at point.
 BRIGHT = 3.0
+#: Ratio of its distance from there to its radius, if it has one.
+SMALL = 10.0
 
 
 class Lights:
@@ -42,7 +44,7 @@ class Lights:
 
     def _edited(self, editor: Editor, light: Light) -> Light:
         light = edit_fields(light, editor.step)
-        if isinstance(light, DirectionalLight):
+        if light.distant:
             return light
         changed, moves = imgui.checkbox("moves", editor.moving_light == self.chosen)
         imgui.set_item_tooltip(f"The light circles around the camera's look-at point once every {ROUND:g} seconds.")
@@ -52,14 +54,13 @@ class Lights:
 
 
 def _new(camera: Camera) -> dict[str, Light]:
-    """Return lights to add: above the camera's look_at point, as far away as the camera."""
+    """Return a light of each type to add: above the camera's look_at point, as far away as the camera."""
     far = distance(camera)
     up = np.asarray(camera.up) / np.linalg.norm(camera.up)
     position, down = np.add(camera.look_at, far * up).tolist(), (-up).tolist()
-    intensity = (BRIGHT * far**2,) * 3
-    return {"point": PointLight(position=position, intensity=intensity),
-            "spot": SpotLight(position=position, direction=down, intensity=intensity),
-            "directional": DirectionalLight(direction=down, irradiance=(BRIGHT,) * 3)}
+    values = {"position": position, "direction": down, "irradiance": (BRIGHT,) * 3, "intensity": (BRIGHT * far**2,) * 3,
+              "radius": far / SMALL, "radiance": (BRIGHT * SMALL**2 / np.pi,) * 3}
+    return {kind.kernel: kind(**fields_of(kind, values)) for kind in LIGHTS}
 
 
 def _edited_sky(environment: Environment, step: float) -> Environment:

@@ -6,8 +6,15 @@ from collections.abc import Callable
 from typing import Any
 
 from clrt.scene.materials.material import Material
-from clrt.scene.materials.material_types import (BlinnPhong, Conductor, Dielectric, Diffuse, MetallicRoughness,
-                                                 Mirror, Phong)
+from clrt.scene.materials.material_types import (
+    BlinnPhong,
+    Conductor,
+    Dielectric,
+    Diffuse,
+    MetallicRoughness,
+    Mirror,
+    Phong,
+)
 
 from ..surface import Surface
 from .conductor import Metal

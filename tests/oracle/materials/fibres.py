@@ -13,7 +13,6 @@ from functools import cache
 import numpy as np
 
 from ...rendering import sheen
-
 from ..textures import bilinear
 from ..vectors import Doubles
 from .scattering import halfway

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ....accel.methods import BoxTest, LayoutName, SphereTest, TriangleTest
 from ....queries.mesh import RayQuery
+from ....rendering.compile.choices import Offset
 from ....rendering.film.film import Film
 from ....rendering.renderer import Renderer
 from ....scene.model import Scene
@@ -23,11 +25,11 @@ class Subject:
     """A configuration under study. device: index into `clrt.devices()`; other fields: see RayQuery and Renderer."""
 
     device: int
-    layout: str | None = None
-    triangle: str = "watertight"
-    box: str = "robust"
-    sphere: str = "robust"
-    offset: str = "bound"
+    layout: LayoutName | None = None
+    triangle: TriangleTest = "watertight"
+    box: BoxTest = "robust"
+    sphere: SphereTest = "robust"
+    offset: Offset = "bound"
 
     def query(self, mesh: Mesh = NO_MESH, spheres: ArrayLike | None = None, **options: Any) -> RayQuery:
         """Return a query of the mesh and spheres; options: further arguments of RayQuery."""

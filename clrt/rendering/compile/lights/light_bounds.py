@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....accel.bvh import Bvh
+from ....scene.lights import Bounds, DistantBounds
+from .environment_map import LUMINANCE
 
 Doubles = NDArray[np.float64]
 
@@ -50,7 +52,7 @@ def flat_lights(corners: Doubles, normal: Doubles, intensity: Doubles, both: NDA
 
 
 def round_lights(center: Doubles, radius: Doubles, intensity: Doubles) -> LightGroups:
-    """Return the bounds of spheres, (n, 3) and (n,), or of points, that emit in all directions.
+    """Return the bounds of spheres, (n, 3) and (n,), that emit in all directions.
 
     A sphere does not illuminate its own surface. There this depends on the last digit of a difference, which compilers
     round differently, so spheres are considered slightly smaller: where one rises above the horizon by no more than
@@ -63,12 +65,30 @@ def round_lights(center: Doubles, radius: Doubles, intensity: Doubles) -> LightG
                        0 * everywhere)
 
 
-def spot_lights(place: Doubles, axis: Doubles, cos_outer: Doubles, intensity: Doubles) -> LightGroups:
-    """Return the bounds of points (n, 3) that emit in cones around unit axes (n, 3), given the cosines of their angles
-    (n,)."""
-    ones = np.ones(len(place))
+def placed_lights(bounds: Sequence[Bounds]) -> LightGroups:
+    """Return the bounds of n lights that have a place but no surface, from float32, as the kernels compute."""
+    center = _float32([each.center for each in bounds]).reshape(-1, 3)
+    radius, intensity = _float32([each.radius for each in bounds]), _float32([each.intensity for each in bounds])
+    axis = _float32([each.axis or (0.0, 0.0, 0.0) for each in bounds]).reshape(-1, 3)
+    cos_cone = np.array([-1.0 if each.axis is None else 1.0 for each in bounds])
+    cos_outer = 1 - _float32([1.0 if each.height is None else each.height for each in bounds])
     reach = np.cos(np.minimum(np.arccos(np.clip(cos_outer, -1, 1)) + WIDER, np.pi / 2)) - LESS
-    return LightGroups(place, place, 0 * ones, axis, ones, intensity, np.maximum(reach, 0))
+    around = radius[:, None]
+    return LightGroups(center - around, center + around, radius, axis, cos_cone, intensity.reshape(-1, 3) @ LUMINANCE,
+                       np.maximum(reach, 0))
+
+
+def distant_lights(bounds: Sequence[DistantBounds]) -> Doubles:
+    """Return (n, 4) for `pack_choice`: a scalar and a vector for each of n lights, whose irradiance at a normal is
+    about scalar + vector·normal."""
+    towards = _float32([each.towards for each in bounds]).reshape(-1, 3)
+    luminance = _float32([each.radiance for each in bounds]).reshape(-1, 3) @ LUMINANCE
+    irradiance = np.array([each.projected for each in bounds]) * luminance
+    return np.asarray(np.column_stack([[each.least for each in bounds], towards]) * irradiance[:, None])
+
+
+def _float32(values: Sequence[object]) -> Doubles:
+    return np.array(values, np.float32).astype(np.float64)
 
 
 def joined(parts: Sequence[LightGroups]) -> LightGroups:

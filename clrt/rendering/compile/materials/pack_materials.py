@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....scene.materials.layer_energy import ENTRY, Table
-from ....scene.materials.material import Culling, as_color
+from ....scene.materials.material import as_color
 from ....scene.materials.material_types import MATERIALS, Material
 from ....scene.materials.textures import Texture
-from ..records import LAYER_PARTS, material_record
+from ....scene.render_settings import Culling
+from ..records import LAYER_PARTS, parameter_record
 from .pack_textures import PackedTextures
 
 Number = float | tuple[float, ...] | int
@@ -85,7 +86,7 @@ def pack_materials(users: Iterable[Material], textures: PackedTextures, tables: 
     reads: dict[str, bool] = {}
     for kind in used:
         values = [_values(material, textures, tables, culling) for material in distinct[kind]]
-        records = np.zeros(len(values), material_record(values))
+        records = np.zeros(len(values), parameter_record(values))
         for name in records.dtype.names or ():
             if name.endswith("_texture"):
                 records[name] = -1

@@ -1,0 +1,46 @@
+"""AOVs (arbitrary output variables): a table of their names, channels, sources and displays.
+
+To add one: write its entry here, and the function that its source needs.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+#: Where its values come from. mean, center: the function seen_NAME of kernels/aov/first_hit.cl, averaged over a pixel's
+#: camera rays or for the ray through its center; hits: those, on the host (clrt/rendering/accumulation/first_hits.py);
+#: film: the film (clrt/rendering/aovs.py).
+Source = Literal["mean", "center", "hits", "film"]
+#: How a .png shows it (clrt/output/aov_files.py).
+Display = Literal["light", "error", "color", "direction", "position", "depth", "count", "id"]
+
+
+class AovType(NamedTuple):
+    """Entry of the table. channels: their names, one or three. reads: what its seen_NAME reads in addition to the
+    geometry: the shading normal, with normal maps, or the BSDF."""
+
+    channels: str
+    source: Source
+    display: Display
+    reads: Literal["", "normal", "bsdf"] = ""
+
+
+AOV_TYPES = {
+    "albedo": AovType("RGB", "mean", "color", "bsdf"),
+    "normal": AovType("XYZ", "mean", "direction", "normal"),
+    "geometric_normal": AovType("XYZ", "mean", "direction"),
+    "position": AovType("XYZ", "center", "position"),
+    "depth": AovType("Z", "hits", "depth"),
+    "primitive": AovType("X", "hits", "id"),
+    "object": AovType("X", "hits", "id"),
+    "material": AovType("X", "hits", "id"),
+    "direct": AovType("RGB", "film", "light"),
+    "indirect": AovType("RGB", "film", "light"),
+    "variance": AovType("RGB", "film", "error"),
+    "samples": AovType("X", "film", "count"),
+}
+
+
+def aovs_from(*sources: Source) -> tuple[str, ...]:
+    """Return the names of the AOVs from these sources, in the order of the table."""
+    return tuple(name for name, kind in AOV_TYPES.items() if kind.source in sources)
