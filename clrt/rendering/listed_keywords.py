@@ -34,9 +34,9 @@ def listed(options: type, settings: Sequence[type] = ()) -> Callable[[F], F]:
             made.__init__ = _checked(made.__init__, function.__name__, hints, described)
         else:
             made = _checked(function, function.__name__, hints, described)
-        made.__doc__ = "\n".join([f"{(made.__doc__ or '').rstrip()}\n", "    Keywords:", *(
-            fill(f"{name}: {_description(name, hint, described)}", 120, initial_indent=" " * 4,
-                 subsequent_indent=" " * 8) for name, hint in hints.items())])
+        made.__doc__ = "\n".join([f"{(made.__doc__ or '').rstrip()}\n", "    Keywords:\n", *(
+            fill(f"- {name}: {_description(name, hint, described)}", 120, initial_indent=" " * 4,
+                 subsequent_indent=" " * 6) for name, hint in hints.items())])
         return cast(F, made)
 
     return decorate

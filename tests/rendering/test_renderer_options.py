@@ -66,7 +66,7 @@ def test_keywords_are_listed_and_described(name: str) -> None:
     """In the signature, which editors show, and in the docstring, which help() shows."""
     listed, text = inspect.signature(CALLS[name]).parameters, inspect.getdoc(CALLS[name]) or ""
     assert all(each.kind is not inspect.Parameter.VAR_KEYWORD for each in listed.values())
-    described = {line.split(":")[0].strip(): line.split(":", 1)[1].strip()
+    described = {line.split(":")[0].strip(" -"): line.split(":", 1)[1].strip()
                  for line in text.split("Keywords:")[1].splitlines() if ":" in line}
     for keyword in hints_of(RendererOptions):
         assert listed[keyword].kind is inspect.Parameter.KEYWORD_ONLY and described[keyword]
