@@ -25,9 +25,11 @@ from .scene.model import Scene
 
 @with_default_errors
 def load(path: StrPath, camera: str | None = None) -> Scene:
-    """Load the scene in a .toml or .xml file or a bare model (formats.models.FORMATS). camera: the name of one of the
-    file's cameras to use, or for a bare model "front", "right", "back" or "left". Raises SceneError, which lists all
-    problems."""
+    """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (.glb .gltf .obj .ply .stl .off).
+
+    camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left".
+    Raises SceneError, which lists all problems.
+    """
     return _load(path, camera)
 
 

@@ -86,7 +86,7 @@ def found(text: str, words: Mapping[str, str] = WORDS) -> list[str]:
 
 
 def test_prose_uses_the_words_of_the_field() -> None:
-    paths = [*HOUSE.glob("*.md"), *(HOUSE / "docs").glob("*.md"), *(HOUSE / "scenes").glob("*.md"),
+    paths = [*HOUSE.glob("*.md"), *(HOUSE / "docs").rglob("*.md"), *(HOUSE / "scenes").glob("*.md"),
              *(HOUSE / "clrt").rglob("*.py"), *(HOUSE / "kernels").rglob("*.cl")]
     wrong = [f"{path.relative_to(HOUSE)}:{line}: write {better}" for path in sorted(paths)
              for line, text in prose(path) for better in found(text)]

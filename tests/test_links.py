@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
+
 HOUSE = Path(__file__).parents[1]
-DOCUMENTS = sorted([*HOUSE.glob("*.md"), *(HOUSE / "docs").glob("*.md"), *(HOUSE / "scenes").glob("*.md")])
+DOCUMENTS = sorted([*HOUSE.glob("*.md"), *(HOUSE / "docs").rglob("*.md"), *(HOUSE / "scenes").glob("*.md")])
 
 
 def anchors(document: Path) -> set[str]:
@@ -29,7 +31,8 @@ def test_links_lead_to_files_and_headings() -> None:
     assert not broken
 
 
-def test_the_index_lists_every_document() -> None:
-    index = (HOUSE / "docs" / "README.md").read_text(encoding="utf-8")
-    assert [path.name for path in (HOUSE / "docs").glob("*.md")
+@pytest.mark.parametrize("folder", ["docs", "docs/measurements"])
+def test_the_index_lists_every_document(folder: str) -> None:
+    index = (HOUSE / folder / "README.md").read_text(encoding="utf-8")
+    assert [path.name for path in (HOUSE / folder).glob("*.md")
             if path.name != "README.md" and f"({path.name})" not in index] == []

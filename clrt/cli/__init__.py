@@ -13,7 +13,7 @@ from typing import NoReturn
 import click
 
 from ..errors import ClrtError, DeviceError, KernelError, OutputError
-from .options import CommandGroup
+from .command_group import CommandGroup
 from .streams import open_missing, patient_stdout, show_names, stdout_problem, tell
 
 STARTED = time.perf_counter()

@@ -18,7 +18,7 @@ from .bench_peers import peers_command
 from .bench_rays import rays_command
 from .bench_render_fidelity import render_fidelity_command
 from .bench_theses import theses_command
-from .options import CommandGroup
+from .command_group import CommandGroup
 
 
 @click.group(cls=CommandGroup)

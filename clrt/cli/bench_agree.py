@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from .bench_files import figures_options, write_figures
-from .options import Size
+from .option_types import Size
 
 
 @click.command("agree")

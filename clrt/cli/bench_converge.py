@@ -12,7 +12,7 @@ import click
 
 from ..errors import UsageError
 from .bench_files import figures_options, write_figures
-from .options import Size
+from .option_types import Size
 
 if TYPE_CHECKING:
     from ..bench.convergence.converge import Effort
@@ -64,7 +64,7 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     from ..device.discovery.discover import choose
     from ..formats.load_scene import load
     from .converge_tables import calibration_lines, scene_lines
-    from .render import read_reference
+    from .render_job import read_reference
 
     devices = [choose(selector)[0] for selector in selectors or (None,)]
     named = [f"device {device.index}: {device.name} ({device.platform}, {device.driver})" for device in devices]

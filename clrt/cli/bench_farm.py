@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from .bench_files import figures_options, write_figures
-from .options import Size
+from .option_types import Size
 
 TRIALS = ("equality", "animation", "kills", "overhead", "huge")
 SCENES = Path(__file__).parents[2] / "scenes"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import click
 
+from ..accel.methods import BuilderName, LayoutName
 from .bench_files import figures_options, write_figures
-from .options import box_option, triangle_option
+from .options import hit_options
 
 
 @click.command("rays")
@@ -17,11 +18,10 @@ from .options import box_option, triangle_option
 @click.option("--rays", type=click.Path(path_type=Path), metavar="FILE.npz",
               help="Arrays origins (n, 3), directions (n, 3), t_max (n,); default: four kinds, in a closed room.")
 @click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
-@click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "packs", "list"]),
+@click.option("--layout", type=click.Choice(get_args(LayoutName)),
               help="BVH layout; default: all of them or, with --rays, the device's default.")
-@triangle_option
-@box_option
-@click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]), help="BVH builder.")
+@hit_options
+@click.option("--builder", type=click.Choice(get_args(BuilderName)), help="BVH builder.")
 @click.option("--quick", is_flag=True, help="Use fewer rays and a smaller sphere.")
 @figures_options
 def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: Path | None, **options: Any) -> None:

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from . import PROGRAM
 from .guard import guarded
-from .options import Pixel, picture_options, tracing_options
-
-if TYPE_CHECKING:
-    from ..rendering.compile.choices import Choices
-
-#: Options with the name of the scene setting that they replace.
-SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling", "clamp_direct", "clamp_indirect")
+from .option_types import Pixel
+from .options import picture_options, tracing_options
 
 
 @click.command()
@@ -27,13 +22,12 @@ SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling",
               help="Number of the pixel's samples to list, starting with the first.")
 @click.option("--spp", type=click.IntRange(min=1),
               help="Samples per pixel of the render; all are traced for the summary. Default: the scene's.")
-@click.option("--integrator", type=click.Choice(["path", "direct"]), help="Integrator; default: the scene's.")
 @click.option("--device", metavar="SEL", help="Device: number, id, part of a name, cpu or gpu; see `clrt devices`.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @picture_options
 @tracing_options
 def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: str | None, as_json: bool,
-            camera: str | None, depth: int | None, pixel_filter: str | None, **given: Any) -> None:
+            camera: str | None, **given: Any) -> None:
     """Show the light paths of one pixel of SCENE, and why it is black or where its light comes from. With the options
     of a render, the samples are exactly those of that render."""
     if click.get_current_context().obj == PROGRAM:
@@ -46,12 +40,12 @@ def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: st
     from ..device.open import open_device
     from ..formats.load_scene import load
     from ..output.json_text import json_text
+    from ..rendering.renderer_options import choices_of, settings_of
 
     content = load(scene, camera)
-    chosen = {"max_depth": depth, "filter": pixel_filter, **{name: given.pop(name) for name in SETTINGS}}
-    content.render = settings = replace(content.render, **{k: v for k, v in chosen.items() if v is not None})
+    content.render = settings = settings_of(content.render, given)
     pixel = pixel or (settings.size[0] // 2, settings.size[1] // 2)
-    paths = trace_pixel(content, open_device(device), pixel, _choices(**given))
+    paths = trace_pixel(content, open_device(device), pixel, choices_of(given))
     names = SceneNames(content, paths.compiled)
     found = summary(paths, names)
     listed = [(i, paths.values[i].tolist(), list(vertices(paths, names, i))) for i in range(min(samples, settings.spp))]
@@ -66,10 +60,3 @@ def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: st
     for i, value, path in listed:
         click.echo("\n".join([*path_lines(i, value, path), ""]))
     click.echo(f"pixel {pixel[0]},{pixel[1]} of {content.name}, {settings.spp} samples: {found}")
-
-
-def _choices(triangle: str, box: str, sphere: str, **others: Any) -> Choices:
-    from ..accel.traversal_kernels import HitTests
-    from ..rendering.compile.choices import Choices
-
-    return Choices(tests=HitTests(triangle, box, sphere), **others)

@@ -10,7 +10,7 @@ import click
 
 from ..errors import DeviceError
 from .logs import verbose_option
-from .options import Finite
+from .option_types import Finite
 
 if TYPE_CHECKING:
     from ..device.discovery.device_info import DeviceInfo, Verdict

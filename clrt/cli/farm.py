@@ -3,44 +3,45 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
 from ..errors import UsageError
+from ..rendering.checkpoint.policy import CheckpointPolicy
 from .frames import FrameSequence
 from .goal import Goal
 from .interrupt import Interruptible
+from .option_groups import flag
 from .outputs import Outputs
 from .progress import Progress
 
 if TYPE_CHECKING:
     from ..farm.cluster import Cluster
     from ..rendering.renderer import Renderer
+    from ..rendering.renderer_options import RendererOptions
     from ..scene.model import Scene
 
-F = TypeVar("F", bound=Callable[..., Any])
 
+@dataclass(frozen=True)
+class ClusterOptions:
+    """A cluster that renders instead of this machine's devices."""
 
-def farm_options(command: F) -> F:
-    """Add the options that select a cluster instead of this machine's devices."""
-    for option in [
-        click.option("--local-cluster", type=click.IntRange(min=1), metavar="N",
-                     help="Render with N worker processes on this machine; needs Dask."),
-        click.option("--scheduler", metavar="ADDRESS",
-                     help="Render on the workers of a Dask scheduler, tcp://… or tls://…; --device is one of theirs."),
-    ]:
-        command = option(command)
-    return command
+    scheduler: str | None = flag(
+        "--scheduler", metavar="ADDRESS",
+        help="Render on the workers of a Dask scheduler, tcp://… or tls://…; --device is one of theirs.")
+    local_cluster: int | None = flag("--local-cluster", type=click.IntRange(min=1), metavar="N",
+                                     help="Render with N worker processes on this machine; needs Dask.")
 
 
 @contextmanager
-def cluster_for(scheduler: str | None, local: int | None, progress: Progress) -> Iterator[Cluster | None]:
+def cluster_for(asked: ClusterOptions, progress: Progress) -> Iterator[Cluster | None]:
     """Provide the requested cluster; None if this machine's devices render."""
+    scheduler, local = asked.scheduler, asked.local_cluster
     if scheduler is None and local is None:
         yield None
         return
@@ -53,7 +54,7 @@ def cluster_for(scheduler: str | None, local: int | None, progress: Progress) ->
         yield cluster
 
 
-def make_renderer(cluster: Cluster | None, scene: Scene, **options: Any) -> Renderer:
+def make_renderer(cluster: Cluster | None, scene: Scene, options: RendererOptions) -> Renderer:
     """Return a renderer on the cluster, or on this machine's devices."""
     if cluster is None:
         from ..rendering.renderer import Renderer
@@ -71,7 +72,7 @@ def is_huge(size: tuple[int, int]) -> bool:
     return size[0] * size[1] > HUGE
 
 
-def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, results: Outputs,
+def render_huge(cluster: Cluster, scene: Scene, options: RendererOptions, goal: Goal, results: Outputs,
                 progress: Progress) -> bool:
     """Render in bands, each to the goal, and write the results; return False if interrupted."""
     from ..farm.banded_picture import BandedPicture
@@ -83,10 +84,9 @@ def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: G
             raise UsageError(f"{name}: is not supported for images of more than 8 million pixels, which are rendered "
                              "in bands, each by a worker; leave it out, or choose a smaller --size")
     checkpoint, resume = options["checkpoint"], options["resume"]
-    of_farm = ("checkpoint", "resume", "checkpoint_seconds", "aovs")
-    chosen = {name: value for name, value in options.items() if name not in of_farm}
+    chosen = {name: value for name, value in _of_worker(options).items() if name != "aovs"}
     banded = BandedPicture(PictureOrder(scene, chosen, spp=goal.spp, error=goal.error),
-                           checkpoint or Path(f"{next(iter(results.pictures), 'image')}.bands"))
+                           Path(checkpoint or f"{next(iter(results.pictures), 'image')}.bands"))
     interrupted: list[bool] = []
     with Interruptible(lambda: interrupted.append(True)):
         for done, count in banded.render(cluster, resume):
@@ -102,20 +102,18 @@ def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: G
     return not interrupted
 
 
-def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, sequence: FrameSequence,
+def render_frames(cluster: Cluster, scene: Scene, options: RendererOptions, goal: Goal, sequence: FrameSequence,
                   progress: Progress) -> bool:
     """Render the remaining frames, each on a worker, and encode the videos; return False if interrupted."""
     from ..farm.orders import PictureOrder
     from ..farm.whole_pictures import WholePictures
     from ..output.image import Image
 
-    of_client = ("checkpoint", "resume", "checkpoint_seconds")
-    chosen = {name: value for name, value in options.items() if name not in of_client}
-    order = PictureOrder(scene, chosen, goal.spp, goal.seconds, goal.error, sequence.outputs.denoise)
+    order = PictureOrder(scene, _of_worker(options), goal.spp, goal.seconds, goal.error, sequence.outputs.denoise)
     shots = {f"frame {results.header['frame']}": (results, camera)
              for results, camera in sequence.left(order.settled, order.choices, goal)}
     pictures = WholePictures(cluster, list(shots), lambda name: replace(order, camera=shots[name][1]),
-                             tuple(options["device"] or ()))
+                             cast(tuple[str, ...], options["device"] or ()))
     interrupted, done, warned = list[bool](), 0, set[str]()
     progress.phase("render")
     with Interruptible(lambda: interrupted.append(True)):
@@ -131,6 +129,12 @@ def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal:
                 return False
     sequence.join()
     return True
+
+
+def _of_worker(options: RendererOptions) -> dict[str, Any]:
+    """Return the options of a worker's renderer: the client writes the checkpoints."""
+    of_client = {field.name for field in fields(CheckpointPolicy)}
+    return {name: value for name, value in options.items() if name not in of_client}
 
 
 def _warn(scene: Scene, texts: Iterable[str]) -> None:

@@ -5,22 +5,22 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import OutputError, UsageError
+from .option_groups import flag
 from .outputs import Outputs
 
 if TYPE_CHECKING:
     from ..rendering.compile.choices import Choices
     from ..scene.model import Camera, Scene
 
-F = TypeVar("F", bound=Callable[..., Any])
 #: Fields of Outputs that do not affect an image's content.
 FILES = {"inputs", "pictures", "report", "plot", "force", "header", "spool", "pipes", "_errors"}
 
@@ -37,19 +37,23 @@ class FrameNumbers(click.ParamType[str]):
         return str(value)
 
 
-def frame_options(command: F) -> F:
-    """Add the options that select frames; without --frames and --turntable a still image is rendered."""
-    for option in [
-        click.option("--fps", type=click.FloatRange(min=0, min_open=True),
-                     help="Frames per second; default: the scene's."),
-        click.option("--turntable", type=click.IntRange(min=1), metavar="N",
-                     help="Orbit once around the point the camera looks at, in N frames."),
-        click.option("--frames", type=FrameNumbers(),
-                     help="Frames of an animation, written to numbered files (name_####.png) or a video (.gif, .mp4, "
-                          ".webm): all, or numbers and ranges such as 12, 0-47, 0-99:5."),
-    ]:
-        command = option(command)
-    return command
+@dataclass(frozen=True)
+class FrameOptions:
+    """Which frames are rendered; without `frames` and `turntable` it is a still image."""
+
+    frames: str | None = flag(
+        "--frames", type=FrameNumbers(),
+        help="Frames of an animation, written to numbered files (name_####.png) or a video (.gif, .mp4, .webm): all, "
+             "or numbers and ranges such as 12, 0-47, 0-99:5.")
+    turntable: int | None = flag("--turntable", type=click.IntRange(min=1), metavar="N",
+                                 help="Orbit once around the point the camera looks at, in N frames.")
+    fps: float | None = flag("--fps", type=click.FloatRange(min=0, min_open=True),
+                             help="Frames per second; default: the scene's.")
+
+    @property
+    def many(self) -> bool:
+        """Whether the frames of an animation are rendered."""
+        return bool(self.frames or self.turntable)
 
 
 @dataclass
@@ -62,7 +66,7 @@ class FrameSequence:
     chosen: list[int] | None
     resume: bool
 
-    def scene(self, scene: Scene, size: tuple[int, int] | None, turntable: int | None, fps: float | None) -> Scene:
+    def scene(self, scene: Scene, size: tuple[int, int] | None, asked: FrameOptions) -> Scene:
         """Return the scene as in its first frame. Checks before rendering that frames exist and outputs are
         writable."""
         from ..output.atomic_files import check_unprotected
@@ -70,10 +74,10 @@ class FrameSequence:
         from ..scene.animation import Animation
         from ..scene.camera_path import frames, turntable as turned
 
-        if turntable is not None:
-            scene = turned(scene, turntable, fps or Animation.fps)
-        elif fps is not None and scene.animation is not None:
-            scene = replace(scene, animation=replace(scene.animation, fps=fps))
+        if asked.turntable is not None:
+            scene = turned(scene, asked.turntable, asked.fps or Animation.fps)
+        elif asked.fps is not None and scene.animation is not None:
+            scene = replace(scene, animation=replace(scene.animation, fps=asked.fps))
         self._stills = {number: still.camera for number, still in frames(scene, self.chosen)}
         self._fps = scene.animation.fps if scene.animation else 0.0
         for video in self.videos:

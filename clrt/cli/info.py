@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,54 +34,20 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         raise click.UsageError("Missing argument 'SCENE'; give a scene file or a model, or --materials")
     from ..formats.load_scene import load
     from ..output.json_text import json_text
-    from ..rendering.accumulation.first_hits import first_hit_program
-    from ..rendering.aovs import chosen_aovs, seen_first
+    from ..rendering.aovs import chosen_aovs
     from ..rendering.compile.compile_scene import compile_scene
     from ..rendering.renderer_options import choices_of
-    from .scene_lists import light_texts, lights_in, material_texts, materials_in
+    from .scene_lists import lights_in, materials_in
+    from .scene_report import report_lines, scene_report
 
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
     choices = choices_of({**chosen, "aovs": names})
     compiled = compile_scene(content, choices, device=_device(selector))
-    built = compiled.tree
-    film = prod(content.render.size) * compiled.choices.pixel.itemsize
-    materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}
-    materials |= {instance.material or instance.mesh.material for instance in content.instances}
-    report: dict[str, Any] = {
-        "scene": content.name, "size": "x".join(map(str, content.render.size)), "spp": content.render.spp,
-        "max_depth": content.render.max_depth, "integrator": content.render.integrator,
-        "meshes": len(content.meshes), "triangles": sum(len(mesh.faces) for mesh in content.meshes),
-        "instances": {"entries": len(content.instances), "in_tree": compiled.instances,
-                      "triangles": sum(len(instance.mesh.faces) for instance in content.instances)},
-        "spheres": len(content.spheres),
-        "cameras": list(content.cameras),
-        "materials": dict(Counter(material.kernel for material in materials)),
-        "lights": {"entries": int(compiled.counts["lights"][0]),
-                   **Counter(type(light).kernel for light in content.lights)},
-        "tree": {"layout": built.name, "builder": built.builder, "nodes": built.nodes, "depth": built.depth,
-                 "stack": built.stack, "sah_cost": built.sah_cost, "bytes": built.bytes,
-                 "build_seconds": built.build_seconds},
-        "features": compiled.features, "files": compiled.files, "kernel_bytes": len(compiled.source.encode()),
-        "buffers": {**{name: array.nbytes for name, (_, array) in compiled.buffers.items()}, "film": film},
-        "bytes": compiled.bytes + film,
-    }
-    if seen := seen_first(names):
-        program = first_hit_program(compiled, seen)[0]
-        report["first_hit"] = {"aovs": " ".join(seen), "kernel_bytes": len(program.encode())}
-    shown, emitting = materials_in(content), lights_in(content)
-    if as_json:
-        click.echo(json_text({**report, "material_list": shown, "light_list": emitting}))
-        return
-    for name, value in report.items():
-        if isinstance(value, dict):
-            value = "  ".join(f"{key} {_short(part)}" for key, part in value.items()) or "none"
-        elif isinstance(value, list):
-            value = " ".join(value) or "none"
-        click.echo(f"{name:13} {_short(value)}")
-    for name, lines in (("material", material_texts(shown)), ("light", light_texts(emitting))):
-        for line in lines:
-            click.echo(f"{name:13} {line}")
+    report = {**scene_report(content, compiled, names), "material_list": materials_in(content),
+              "light_list": lights_in(content)}
+    for line in [json_text(report)] if as_json else report_lines(report):
+        click.echo(line)
 
 
 def _device(selector: str | None) -> Device | None:
@@ -94,7 +58,3 @@ def _device(selector: str | None) -> Device | None:
     if selector is None and not any(info.chosen for info, _ in find_devices()):
         return None
     return open_device(selector)
-
-
-def _short(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else f"{value:_}" if isinstance(value, int) else str(value)

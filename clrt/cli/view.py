@@ -14,7 +14,8 @@ from . import PROGRAM
 from .guard import guarded
 from .interrupt import Interruptible
 from .logs import verbose_option
-from .options import CAMERA, Size
+from .option_types import Size
+from .options import CAMERA
 
 
 @click.command()

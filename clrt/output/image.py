@@ -19,9 +19,13 @@ from .report import header_of
 
 @dataclass(frozen=True)
 class Image:
-    """Rendered image. pixels: (height, width, 3) float32, linear Rec. 709; report: how it was rendered, see
-    `clrt render --report`; raw: the pixels before denoising, None if not denoised; aovs: AOVs by name
-    (docs/aovs.md)."""
+    """Rendered image.
+
+    - pixels: (height, width, 3) float32, linear Rec. 709
+    - report: how it was rendered, as in docs/report.md
+    - raw: the pixels before denoising; None if not denoised
+    - aovs: AOVs by name, see docs/aovs.md
+    """
 
     pixels: NDArray[np.float32]
     report: dict[str, Any] = field(default_factory=dict)
@@ -30,7 +34,7 @@ class Image:
 
     @with_default_errors
     def save(self, path: StrPath, *, view: str = "srgb", exposure: float = 0.0) -> Path:
-        """Write .exr, .hdr (linear) or .png (through `view` after 2^exposure; normals and depths by `shown_data`).
+        """Write .exr or .hdr (linear), or .png (through `view`, after multiplication by 2^exposure).
 
         The AOVs become layers of an .exr, and separate .png files for a .png. Raises OutputError if that fails.
         """

@@ -16,7 +16,7 @@ from ..formats.images.image_reader import read_picture
 from .image import Image
 
 FloatArray = NDArray[np.float32]
-Picture = FloatArray | Image | StrPath
+AnyImage = FloatArray | Image | StrPath
 #: Keeps relMSE finite where the reference is dark.
 RELMSE_FLOOR = 0.01
 #: Limit for HDR-FLIP, the largest float16: the brighter the reference, the more exposures it evaluates.
@@ -33,15 +33,16 @@ def compare_files(image: Path, reference: Path) -> dict[str, Any]:
 
 
 @with_default_errors
-def compare(image: Picture, reference: Picture, *, hdr: bool = True) -> dict[str, Any]:
-    """Return measures of the image x against the reference r, both (h, w, 3) float32 linear, computed in float64; each
-    may also be an `Image`, or the path of an image file.
+def compare(image: AnyImage, reference: AnyImage, *, hdr: bool = True) -> dict[str, Any]:
+    """Return how much an image x differs from a reference r, by several measures.
+
+    Both are (h, w, 3) float32 linear, an `Image`, or the path of an image file; computed in float64:
 
     - relmse: mean((x − r)² / (r² + 0.01)); rmse: √mean((x − r)²); max_abs: max |x − r|
     - mean_ratio: mean(x) / mean(r) of each channel; None if mean(r) is 0
     - flip: mean HDR-FLIP (if `hdr`) or LDR-FLIP; None if flip-evaluator is not installed or HDR-FLIP's reference black
     - nonfinite, nonfinite_reference: the number of values of x and of r that are NaN or Inf. Where either is, the value
-    is excluded from all the measures above (for FLIP it is 0 in both); a measure without any value left is None.
+      is excluded from all the measures above (for FLIP it is 0 in both); a measure without any value left is None.
 
     Raises SceneError if a file cannot be read or the sizes differ, and UsageError if an argument is not an image.
     """
@@ -50,7 +51,7 @@ def compare(image: Picture, reference: Picture, *, hdr: bool = True) -> dict[str
     return _measures(x, r, hdr)
 
 
-def _pixels(picture: Picture, name: str) -> FloatArray:
+def _pixels(picture: AnyImage, name: str) -> FloatArray:
     """Return the pixels (h, w, 3) of an image in any of the accepted forms."""
     if isinstance(picture, str | PathLike):
         return read_picture(Path(picture))

@@ -106,9 +106,9 @@ class TreeQuery:
 
     @with_default_errors
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:
-        """Intersect rays, and return (n,) records of t float32, primitive int32, u, v float32: the first hit at 0 < t <
-        t_max; for a miss t is inf and primitive −1.
+        """Return the first hit of each ray at 0 < t < t_max.
 
+        As (n,) records of t float32, primitive int32, u and v float32; for a miss t is inf and primitive −1.
         The hit point is origin + t·direction = (1 − u − v)·p0 + u·p1 + v·p2. Test for hits by primitive >= 0: the t of
         a hit is inf, too, if it exceeds float32, as with directions of length 1e-40.
         """

@@ -26,10 +26,14 @@ Doubles = NDArray[np.float64]
 class InstancedRayQuery(TreeQuery):
     """Instanced meshes to intersect with rays, as in `TreeQuery`; hits also have an `instance` (int32, −1 for a miss).
 
-    meshes: a list of pairs, vertices (n, 3) float32 and faces (m, 3) int32. mesh: (k,) each instance's index into it.
-    transforms: (k, 3, 4), rows of an affine map from the mesh's frame to the world, which may mirror and scale axes
-    differently. device, layout, builder, triangle, box: as in `RayQuery`; the layout list does not support instances.
+    - meshes: a list of pairs, vertices (n, 3) float32 and faces (m, 3) int32
+    - mesh: (k,) each instance's index into it
+    - transforms: (k, 3, 4), rows of an affine map from the mesh's frame to the world, which may mirror and scale axes
+      differently
+    - device, layout, builder, triangle, box: as in `RayQuery`; the layout list does not support instances
+
     `primitive` is an index into the instance's mesh. Of hits at the same t the lowest instance comes first.
+
     Raises SceneError for other shapes, indices out of range and transforms that are not finite or singular, and
     UsageError for other choices.
     """

@@ -23,15 +23,21 @@ from .base import TreeQuery
 class RayQuery(TreeQuery):
     """Triangles and spheres to intersect with rays; `TreeQuery`, the base class, describes rays and hits.
 
-    vertices: (n, 3) float32, or float64 if far from the origin; faces: (m, 3) int32; spheres: (s, 4) float32, center
-    and radius, the primitives m … m + s − 1, with u = v = 0. The first four choices do not affect the results:
-    device: a number, an id, a part of a name, "cpu" or "gpu", see `clrt.devices()`; None selects the best.
-    layout: "bvh8", "bvh2", "cwbvh", "packs" or "list" (brute force); None selects bvh8 on CPUs and cwbvh on GPUs.
-    builder: "sah" or "midpoint" in numpy, "ploc" or "reinsertion" on the device; None selects sah for small meshes and
-    ploc for large ones.
-    traversal: "single", "packet" or "pool", for bvh8 only: see `TreeQuery`.
-    triangle: "watertight", or "moller_trumbore", "precomputed", "baldwin_weber", which may miss at shared edges.
-    box: "robust" or "plain"; sphere: "robust" or "textbook".
+    - vertices: (n, 3) float32, or float64 if far from the origin; faces: (m, 3) int32
+    - spheres: (s, 4) float32, center and radius, the primitives m … m + s − 1, with u = v = 0
+
+    Choices that do not affect the results:
+
+    - device: a number, an id, a part of a name, "cpu" or "gpu", see `clrt.devices()`; None selects the best
+    - layout: "bvh8", "bvh2", "cwbvh", "packs" or "list" (brute force); None selects bvh8 on CPUs and cwbvh on GPUs
+    - builder: "sah" or "midpoint" in numpy, "ploc" or "reinsertion" on the device; None selects sah for small meshes
+      and ploc for large ones
+    - traversal: "single", "packet" or "pool", for bvh8 only
+
+    Intersection tests:
+
+    - triangle: "watertight", or "moller_trumbore", "precomputed", "baldwin_weber", which may miss at shared edges
+    - box: "robust" or "plain"; sphere: "robust" or "textbook"
 
     Raises SceneError for arrays of other shapes, numbers that are not finite, indices out of range and radii that are
     not above 0, and UsageError for other choices.

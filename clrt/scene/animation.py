@@ -15,8 +15,11 @@ Positive = Annotated[float, Gt(0)]
 
 @dataclass(frozen=True, kw_only=True)
 class Keyframe:
-    """The camera's fields (see `Camera`) at a `time` in seconds. A field that is None is interpolated between the
-    keyframes that set it, and keeps the camera's own value if none does."""
+    """The camera's fields (see `Camera`) at a `time` in seconds.
+
+    A field that is None is interpolated between the keyframes that set it, and keeps the camera's own value if none
+    does.
+    """
 
     time: float
     position: Vector | None = None

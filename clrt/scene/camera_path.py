@@ -19,8 +19,10 @@ MOST_FRAMES = 1_000_000
 
 
 def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
-    """Return the scene with the camera going once around in this number of frames. Raises UsageError unless `frames`
-    is at least 1 and `fps` is above 0 and finite."""
+    """Return the scene with the camera going once around in this number of frames.
+
+    Raises UsageError unless `frames` is at least 1 and `fps` is above 0 and finite.
+    """
     if not frames >= 1:
         raise UsageError(f"frames is {frames}; it must be at least 1")
     if not 0 < fps < np.inf:
@@ -29,8 +31,10 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
 
 
 def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
-    """Return the number and the static scene of all frames, or of the `chosen` ones. The scenes differ in their camera
-    alone. Raises SceneError if the scene has no animation or an invalid one, UsageError for an invalid number.
+    """Return the number and the static scene of all frames, or of the `chosen` ones.
+
+    The scenes differ in their camera alone. Raises SceneError if the scene has no animation or an invalid one,
+    UsageError for an invalid number.
     """
     if scene.animation is None:
         raise SceneError(f"{scene.name}: has no animation; write [[keyframe]] tables, or use a turntable (--turntable, "

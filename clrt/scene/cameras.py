@@ -25,9 +25,12 @@ Projection = Literal["perspective", "orthographic", "equirectangular"]
 class Camera:
     """Camera. `look_at` is at the image center; the image's right is cross(forward, up).
 
-    perspective: pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
-    `look_at`); `fov_degrees`: vertical, full angle. orthographic: parallel rays, an image `view_height` high (None: as
-    the perspective view at `look_at`). equirectangular: all directions, in Environment's mapping for a view along +Z.
+    projection:
+
+    - "perspective": pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
+      `look_at`); `fov_degrees`: vertical, full angle.
+    - "orthographic": parallel rays, an image `view_height` high (None: as the perspective view at `look_at`).
+    - "equirectangular": all directions, in Environment's mapping for a view along +Z.
     """
 
     position: Vector = (0.0, 0.0, 5.0)

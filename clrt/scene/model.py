@@ -32,12 +32,14 @@ Positive = Annotated[float, Gt(0)]
 class Mesh:
     """Triangle mesh with one material.
 
-    vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; lists and arrays of other
-    dtypes are converted. normals: (n, 3) float32, interpolated over each face, or None for flat shading.
-    uv, uv1: (n, 2) float32, the two sets of texture coordinates (scene.textures). colors: (n, 3) or (n, 4) float32,
-    linear, from 0 to 1; they multiply the material's color, and the fourth component its opacity unless that is 1.
-    tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing.
-    material_name: the material's name in the model file.
+    - vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front. Lists and arrays of other
+      dtypes are converted.
+    - normals: (n, 3) float32, interpolated over each face, or None for flat shading.
+    - uv, uv1: (n, 2) float32, the two sets of texture coordinates (see `Texture`).
+    - colors: (n, 3) or (n, 4) float32, linear, from 0 to 1; they multiply the material's color, and the fourth
+      component its opacity unless that is 1.
+    - tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing.
+    - material_name: the material's name in the model file.
     """
 
     vertices: FloatArray
@@ -152,11 +154,12 @@ class Source:
 
 @dataclass(eq=False, kw_only=True)
 class Scene:
-    """Everything needed to render an image. `camera` is rendered; `cameras`: others by name, including those of model
-    files; `animation`: how the camera moves (scene.animation).
+    """Everything needed to render an image.
 
-    materials: the scene file's named ones; meshes and spheres refer to these objects. source: the files that its parts
-    were read from, if any.
+    - camera: the one to render; cameras: others by name, including those of model files.
+    - animation: how the camera moves.
+    - materials: the scene file's named ones; meshes and spheres refer to these objects.
+    - source: the files that its parts were read from, if any.
     """
 
     meshes: list[Mesh] = field(default_factory=list)

@@ -19,6 +19,7 @@ from clrt.debug.trace import trace_pixel
 from clrt.device.open import Device
 from clrt.device.programs import program
 from clrt.rendering.accumulation.denoiser_guides import render_guides
+from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.cameras import CAMERA_TYPES, Perspective, Projection
 from clrt.scene.materials.material_types import Diffuse
@@ -231,7 +232,7 @@ def test_a_camera_may_have_no_ray(device: Device, paths: str, tmp_path: Path, mo
     scene = Scene(spheres=[Sphere(material=red)], environment=sky, camera=Camera(),
                   render=RenderSettings(size=(32, 16), spp=4))
     options: dict[str, Any] = {"device": device.info.index, "paths": paths, "lanes": 8, "first_hits": True,
-               "aovs": "albedo,normal,position,depth,object,direct,indirect,samples"}
+                               "aovs": "albedo,normal,position,depth,object,direct,indirect,samples"}
 
     def rendered() -> tuple[dict[str, NDArray[np.generic]], int]:
         renderer = clrt.Renderer(scene, **options)
@@ -252,7 +253,7 @@ def test_a_camera_may_have_no_ray(device: Device, paths: str, tmp_path: Path, mo
         assert np.all(picture[:, :16] == nothing), name
     assert fewer == pytest.approx(rays / 2, rel=0.05) and whole["image"][:, :16].all()
     for column, black in ((2, True), (29, False)):
-        traced = trace_pixel(scene, device, (column, 8))
+        traced = trace_pixel(scene, device, (column, 8), Choices(lanes=8))
         assert len(traced.starts) == 4 and np.all(traced.rows["end"] == PathEnd.ESCAPED)
         np.testing.assert_allclose(traced.value, 0 if black else sky.color, rtol=1e-6)
 

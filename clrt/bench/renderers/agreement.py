@@ -107,7 +107,7 @@ def agreement(scene: Scene, spp: int, seeds: int, device: str | int | None = Non
     try:
         from .mitsuba_renderer import contestants
         # The first, with independent samples: images of multijitter share permutations between seeds, so that the
-        # spread over seeds underestimates their error (docs/accuracy.md).
+        # spread over seeds underestimates their error (docs/measurements/mitsuba.md).
         theirs = next(iter(contestants(scene).values()))
     except ImportError:
         raise UsageError("Mitsuba is not installed (pip install mitsuba)") from None

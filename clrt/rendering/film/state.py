@@ -19,9 +19,14 @@ from .film import RELATIVE_FLOOR, Film
 
 @dataclass(frozen=True)
 class State:
-    """Image so far. spp: samples per pixel, the mean if sampling is adaptive; noise: estimated √relMSE, None below 2
-    samples; relmse: against the reference, if given; tile_noise: the renderer's percentile of the tiles' estimated
-    √relMSE, if it has one."""
+    """Image so far.
+
+    - spp: samples per pixel, the mean if sampling is adaptive; seconds: render time
+    - noise: estimated √relMSE; None below 2 samples
+    - relmse: against the reference, if given
+    - film: the sums of the samples
+    - tile_noise: the renderer's percentile of the tiles' estimated √relMSE, if it has one
+    """
 
     spp: int
     seconds: float

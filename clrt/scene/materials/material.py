@@ -24,13 +24,15 @@ ALPHA_MIN = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """Base class of materials.
+    """Base class of materials, with the fields that all have.
 
-    emission: radiance in W·sr⁻¹·m⁻² that its front side emits. double_sided: its back side emits, too, and is not
-    subject to back-face culling (glTF's doubleSided). normal_map: perturbs the shading normal (glTF's convention:
-    linear, x to the right and y up in the image); its factor scales x and y. opacity: the fraction of light that
-    interacts with the surface; the rest passes straight through. With an alpha_cutoff (alpha mask) the surface is
-    opaque where the opacity reaches it, and absent elsewhere. one_sided: invisible from behind.
+    - emission: radiance in W·sr⁻¹·m⁻² that its front side emits
+    - double_sided: its back side emits, too, and is not subject to back-face culling (glTF's doubleSided)
+    - one_sided: invisible from behind
+    - normal_map: perturbs the shading normal (glTF's convention: linear, x to the right and y up in the image); its
+      factor scales x and y
+    - opacity: the fraction of light that interacts with the surface; the rest passes straight through
+    - alpha_cutoff (alpha mask): the surface is opaque where the opacity reaches it, and absent elsewhere
     """
 
     kernel: ClassVar[str]
@@ -130,9 +132,8 @@ class TextureRole(Enum):
 
 @lru_cache
 def texture_roles(kind: type) -> dict[str, TextureRole]:
-    """Return the roles of the fields of a material type that accept textures, by the types of the fields: `Albedo |
-    Texture`, `Unit | Texture`
-    or `Texture | None`."""
+    """Return the roles of the fields of a material type that accept textures, by the fields' types: `Albedo | Texture`,
+    `Unit | Texture` or `Texture | None`."""
     roles: dict[str, TextureRole] = {}
     for name, hint in get_type_hints(kind).items():
         accepted = get_args(hint)

@@ -73,12 +73,14 @@ class Mirror(Material):
 class Dielectric(Material):
     """Glass or water: the Fresnel equations give the fractions reflected and refracted.
 
-    ior: index of refraction inside over that outside; color: the fraction of the refracted light that is transmitted.
-    roughness: of the surface, with alpha = roughness² of the GGX distribution; 0 is smooth. thin: a sheet without an
-    interior, which does not bend light and transmits `color` from face to face. Inside others light is attenuated to
-    attenuation_color per attenuation_distance, in scene units (glTF's KHR_materials_volume; None: no attenuation).
-    multiple_scattering: compensates the energy that single scattering between microfacets loses
-    (scene.dielectric_energy), so that rough glass loses no light.
+    - ior: index of refraction inside over that outside
+    - color: the fraction of the refracted light that is transmitted
+    - roughness: of the surface, with alpha = roughness² of the GGX distribution; 0 is smooth
+    - multiple_scattering: compensates the energy that single scattering between microfacets loses, so that rough glass
+      loses no light
+    - thin: a sheet without an interior, which does not bend light and transmits `color` from face to face
+    - attenuation_color, attenuation_distance: inside others light is attenuated to this color per this distance, in
+      scene units (glTF's KHR_materials_volume; None: no attenuation)
     """
 
     kernel: ClassVar[str] = "dielectric"

@@ -79,12 +79,11 @@ def lights_of(scene: Scene, kernel: str) -> list[Light]:
 
 
 def _records(lights: Sequence[Light]) -> NDArray[Any]:
-    """Return the records of lights that one kernel file samples."""
+    """Return the records of one or more lights that one kernel file samples."""
     values = [light.parameters() for light in lights]
-    records = np.zeros(len(values), parameter_record(values))
-    for record, named in zip(records, values):
-        for name, value in named.items():
-            record[name] = value
+    records = np.zeros(len(values), parameter_record(values[:1]))
+    for name in values[0]:
+        records[name] = [named[name] for named in values]
     return records
 
 

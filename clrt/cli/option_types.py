@@ -1,0 +1,43 @@
+"""Types of command-line options."""
+
+from __future__ import annotations
+
+import re
+from math import isfinite
+from typing import Any
+
+import click
+
+
+class Size(click.ParamType[tuple[int, int]]):
+    """WIDTHxHEIGHT in pixels, e.g. 1920x1080."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
+        match = re.fullmatch(r"(\d+)[xX](\d+)", str(value))
+        if not match or not all(1 <= int(n) <= 65536 for n in match.groups()):
+            self.fail(f"{value!r} is not a size; write WIDTHxHEIGHT, each 1 to 65536, e.g. 640x480", param, context)
+        return int(match[1]), int(match[2])
+
+
+class Pixel(click.ParamType[tuple[int, int]]):
+    """X,Y of a pixel, e.g. 120,64."""
+
+    name = "X,Y"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
+        match = re.fullmatch(r"(\d{1,9}),(\d{1,9})", str(value))
+        if not match:
+            self.fail(f"{value!r} is not a pixel; write X,Y, its column and row from 0, e.g. 120,64", param, context)
+        return int(match[1]), int(match[2])
+
+
+class Finite(click.FloatRange):
+    """Range that excludes NaN and infinity, which all of click's ranges include."""
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> float:
+        number: float = super().convert(value, param, context)
+        if not isfinite(number):
+            self.fail(f"{value!r} is not a finite number; give a finite one", param, context)
+        return number

@@ -1,0 +1,39 @@
+"""The commands and Python examples of the how-tos run and print the output that they state."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+HOUSE = Path(__file__).parents[1]
+#: Page → number of its blocks, and files that they write.
+PAGES = {"rays": (4, ()), "transparent-background": (1, ("product.png",)),
+         "dataset": (3, ("view_0003.exr", "view_0003.npz", "cameras.json"))}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_examples_print_what_they_say(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                      capsys: pytest.CaptureFixture[str]) -> None:
+    """Blocks run in order and share variables; the comment after each print is its expected output."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scenes").symlink_to(HOUSE / "scenes")
+    page = HOUSE / "docs" / f"{name}.md"
+    names: dict[str, Any] = {}
+    blocks = re.findall(r"```(sh|python)\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    for language, block in blocks:
+        if language == "sh":
+            for line in block.splitlines():
+                program, *arguments = shlex.split(line)
+                assert program == "clrt"
+                subprocess.run([sys.executable, "-P", "-m", "clrt", *arguments], check=True)
+        else:
+            exec(compile(block, str(page), "exec"), names)
+            assert capsys.readouterr().out.splitlines() == re.findall(r"^print\(.*\)  # (.*)$", block, re.MULTILINE)
+    count, files = PAGES[name]
+    assert len(blocks) >= count and [file for file in files if not (tmp_path / file).is_file()] == []
