@@ -10,7 +10,7 @@
 #include "film/film.cl"
 #include "light/dispatch.cl"
 #include "surface/shading.cl"
-#include VISIBILITY
+#include "visibility/interface.cl"
 
 typedef struct { real3 albedo, normal; } Seen;
 
@@ -71,7 +71,7 @@ kernel void guides(SCENE_PARAMETERS, global Guide *pixels, global const uint *ti
         sum.albedo = add(sum.albedo, seen.albedo);
         sum.normal = add(sum.normal, seen.normal);
     }
-    if (loops_ended(2 + (launch.width == 0))) return;
+    if (loops_ended(launch.width)) return;
     real share = (real)(1.0f / (float)launch.sample_count);
     real3 albedo = scale(sum.albedo, share), normal = scale(sum.normal, share);
     for (int lane = 0; lane < LANES; ++lane) {

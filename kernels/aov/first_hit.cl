@@ -9,7 +9,7 @@
 // seen_NAME here, with the same value in x, y and z if it has one channel, and its entry in clrt/aov_types.py.
 #include "integrator/camera_rays.cl"
 #include "film/film.cl"
-#include VISIBILITY
+#include "visibility/interface.cl"
 #include SEEN_FILES
 
 #if PRIMITIVES
@@ -73,7 +73,7 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
     hit = meet(&scene, &ray, active, &sampler, &surface, &primitive, &instance);
     SEEN_MIDDLE(ADD)
 #endif
-    if (loops_ended(2 + (launch.width == 0))) return;
+    if (loops_ended(launch.width)) return;
 #define DIVIDE(name) name = scale(name, (real)(1.0f / (float)launch.sample_count));
     SEEN_MEANS(DIVIDE)
     for (int lane = 0; lane < LANES; ++lane) {

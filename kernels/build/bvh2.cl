@@ -12,15 +12,9 @@ static inline void write_node(global Node *node, Box box, int left_first, int co
 }
 
 kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
-    Primitives primitives = PRIMITIVE_ARGUMENTS;
-    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    float areas = 0.0f;
-    for (uint i = first; i < end; ++i) {
+    FOR_NODES {
         uint children = 2 * (first_node + i + 1);
-        Places next = PLACES(i);
-        prefetch_slots(binary, plans, slots, i, end);
-        Content contents[CHILDREN];
-        contents_of(&primitives, plans, slots + CHILDREN * i, contents);
+        OPEN_NODE
         Box around = NO_BOX;
         for (int s = 0; s < CHILDREN; ++s) {
             Content content = contents[s];
@@ -36,5 +30,5 @@ kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
             write_node(nodes + 1, NO_BOX, 0, 0);
         }
     }
-    if (first < count) work[get_global_id(0)] += areas;
+    ADD_AREAS
 }

@@ -20,22 +20,10 @@ static inline void write_axis(global Node *node, int axis, const float *lo, cons
     }
 }
 
-static inline void put_lane(float (*rows)[CHILDREN], int lane, float3 v) {
-    rows[0][lane] = v.x;
-    rows[1][lane] = v.y;
-    rows[2][lane] = v.z;
-}
-
 kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
-    Primitives primitives = PRIMITIVE_ARGUMENTS;
-    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    float areas = 0.0f;
-    for (uint i = first; i < end; ++i) {
+    FOR_NODES {
         global Node *node = nodes + first_node + i;
-        Places next = PLACES(i);
-        prefetch_slots(binary, plans, slots, i, end);
-        Content contents[CHILDREN];
-        contents_of(&primitives, plans, slots + CHILDREN * i, contents);
+        OPEN_NODE
         float lo[3][CHILDREN], hi[3][CHILDREN];
         Box around = NO_BOX;
         bool spheres = false;
@@ -55,8 +43,8 @@ kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
                 inner |= content.leaf ? 0 : 1u << s;
                 spheres |= content.leaf && content.sphere;
             }
-            put_lane(lo, s, box.lo);
-            put_lane(hi, s, box.hi);
+            WRITE_COLUMN(lo, s, box.lo)
+            WRITE_COLUMN(hi, s, box.hi)
         }
         node->imask = inner;
         node->primitive = spheres ? triangle_count + next.sphere - leaf_place : next.triangle - leaf_place;
@@ -64,5 +52,5 @@ kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
         write_axis(node, 1, lo[1], hi[1], around.lo.y, around.hi.y);
         write_axis(node, 2, lo[2], hi[2], around.lo.z, around.hi.z);
     }
-    if (first < count) work[get_global_id(0)] += areas;
+    ADD_AREAS
 }

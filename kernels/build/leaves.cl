@@ -51,6 +51,21 @@ typedef struct { uint node, triangle, sphere; } Places;
                          global LeafSphere *leaf_spheres, global float *work
 #define PLACES(i) {next_node + places[i], first_triangle + places[count + (i)], first_sphere + places[2 * count + (i)]}
 
+// The nodes i of a level in this work-item's block; `areas` sums their visited areas, which ADD_AREAS stores.
+#define FOR_NODES \
+    Primitives primitives = PRIMITIVE_ARGUMENTS; \
+    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count; \
+    float areas = 0.0f; \
+    for (uint i = first; i < end; ++i)
+#define ADD_AREAS if (first < count) work[get_global_id(0)] += areas;
+
+// The contents of the slots of node i, and the indices of what they refer to.
+#define OPEN_NODE \
+        Places next = PLACES(i); \
+        prefetch_slots(binary, plans, slots, i, end); \
+        Content contents[CHILDREN]; \
+        contents_of(&primitives, plans, slots + CHILDREN * i, contents);
+
 // Allocate the index of a slot's content; write the records of a leaf.
 static inline uint fill_slot(const Primitives *primitives, global const BinaryNode *nodes, Content content, Places *next,
                              global Triangles *triangles, global LeafSphere *leaf_spheres) {

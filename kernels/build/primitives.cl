@@ -23,6 +23,13 @@ static inline bool is_sphere(const Primitives *primitives, int primitive) {
     return (!TRIANGLES || primitives->ids[primitive] >= primitives->triangle_count) && SPHERES;
 }
 
+// Write x, y and z of v to a column of three rows.
+#define WRITE_COLUMN(rows, column, v) { \
+        (rows)[0][column] = (v).x; \
+        (rows)[1][column] = (v).y; \
+        (rows)[2][column] = (v).z; \
+    }
+
 static inline Box box_union(Box a, Box b) {
     return (Box){a.lo < b.lo ? a.lo : b.lo, a.hi > b.hi ? a.hi : b.hi};
 }

@@ -1,20 +1,14 @@
 // Refit one level of the layout bvh8 (clrt/accel/layouts.py), whose leaves are packs of eight triangles.
 #include "build/refit.cl"
 
-static inline void store_lane(global float rows[3][8], int lane, float3 v) {
-    rows[0][lane] = v.x;
-    rows[1][lane] = v.y;
-    rows[2][lane] = v.z;
-}
-
 // Unused lanes, which come last, keep their NaN corners.
 static inline Box refit_pack(global const float *vertices, global const int *faces, global Triangles *pack) {
     Box box = NO_BOX;
     for (int lane = 0; lane < 8 && pack->primitive[lane] >= 0; ++lane) {
         Corners corners = face_corners(vertices, faces, pack->primitive[lane]);
-        store_lane(pack->p0, lane, corners.p0);
-        store_lane(pack->p1, lane, corners.p1);
-        store_lane(pack->p2, lane, corners.p2);
+        WRITE_COLUMN(pack->p0, lane, corners.p0)
+        WRITE_COLUMN(pack->p1, lane, corners.p1)
+        WRITE_COLUMN(pack->p2, lane, corners.p2)
         box = box_union(box, corners_box(corners));
     }
     return box;
@@ -40,8 +34,8 @@ kernel void refit_level(uint count, uint block, REFIT_PARAMETERS) {
             int child = node->child[slot];
             if (child == EMPTY) continue;
             Box box = child < 0 ? refit_pack(vertices, faces, leaves + (~child >> 4)) : node_bounds(nodes + child);
-            store_lane(node->lo, slot, box.lo);
-            store_lane(node->hi, slot, box.hi);
+            WRITE_COLUMN(node->lo, slot, box.lo)
+            WRITE_COLUMN(node->hi, slot, box.hi)
         }
     }
 }

@@ -2,13 +2,16 @@
 // total; after that each loop silently ends after its first iteration (clrt/device/launches/driver_loop_limits.py).
 // LOOP_LIMIT: the driver is one of these.
 #if LOOP_LIMIT
-// Whether that has happened to this work-item, which invalidates its results. `two` is 2, but must be unknown to the
-// compiler, which would otherwise fold the loop.
-static inline bool loops_ended(uint two) {
+// 2, which the compiler must not know: it would fold the loop below. number: one that is known at run time alone, and
+// never the largest uint, which the compiler cannot know either.
+#define HIDDEN_TWO(number) (2 + ((number) == 0xffffffff))
+
+// Whether that has happened to this work-item, which invalidates its results. number: see HIDDEN_TWO.
+static inline bool loops_ended(uint number) {
     uint a = 1;
-    for (uint turn = 0; turn < two; ++turn) a = 5 * a + 1;
+    for (uint turn = 0, turns = HIDDEN_TWO(number); turn < turns; ++turn) a = 5 * a + 1;
     return a != 31;
 }
 #else
-#define loops_ended(two) false
+#define loops_ended(number) false
 #endif

@@ -77,7 +77,7 @@ static inline void store_rows(global float *row, const real3 *value, int lane) {
 
 // Store nothing if the driver ended loops early: the host then finds samples missing.
 static inline void store_pixels(global Pixel *film, ureal index, ireal stored, const Accumulator *a) {
-    if (loops_ended(2 + (LANE_UINT(index, 0) == 0xffffffff))) return;
+    if (loops_ended(LANE_UINT(index, 0))) return;
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(stored, lane)) continue;
         global Pixel *pixel = film + LANE_UINT(index, lane);

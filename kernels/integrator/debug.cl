@@ -177,7 +177,7 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
                 store_vertex(vertices + (first + lane) * launch.max_depth + depth - 1, &v, lane);
         arrived = active;
     }
-    if (!loops_ended(2 + (launch.width == 0))) return;
+    if (!loops_ended(launch.width)) return;
     for (uint lane = 0; lane < LANES && first + lane < launch.sample_count; ++lane)
         vertices[(first + lane) * launch.max_depth].end = END_LOOPS;
 }

@@ -7,7 +7,7 @@
 #include "integrator/camera_rays.cl"
 #include "surface/surface.cl"
 #include PICTURE
-#include VISIBILITY
+#include "visibility/interface.cl"
 
 static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
                                ureal *rays, real3 *direct, real *removed) {

@@ -11,7 +11,7 @@
 #include "integrator/camera_rays.cl"
 #include "light/dispatch.cl"
 #include "surface/shading.cl"
-#include VISIBILITY
+#include "visibility/interface.cl"
 
 // 1. Emission at the end of the ray: emissive surfaces and the environment.
 static inline real3 seen_light(const Scene *scene, real3 origin, real3 direction, const Surface *surface, real t, ireal hit,

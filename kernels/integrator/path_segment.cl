@@ -5,7 +5,7 @@
 // World frame; radiance in W·sr⁻¹·m⁻². Light is returned as its contribution at the camera, 0 in inactive lanes.
 #include "light/dispatch.cl"
 #include "surface/shading.cl"
-#include VISIBILITY
+#include "visibility/interface.cl"
 
 #define ROULETTE_DEPTH 4   // path depth from which Russian roulette may end a path
 

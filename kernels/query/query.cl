@@ -10,11 +10,10 @@
 #define ANY_HIT any_hit
 #endif
 
-// Marks the answers of a work-item whose loops the driver ended early: primitive −2, blocked 2.
-#define LOOPS_ENDED loops_ended(2 + (first == 0xffffffff))
+// The answers of a work-item whose loops the driver ended early are marked: primitive −2, blocked 2.
 
 static inline void store_hits(global RayHit *hits, const Rays *rays, uint first, uint count, const Hits *found) {
-    bool ended = LOOPS_ENDED;
+    bool ended = loops_ended(first);
     for (uint lane = 0; lane < LANES && first + lane < count; ++lane) {
         hits[first + lane] = ray_hit(LANE(found->t, lane), LANE(found->u, lane), LANE(found->v, lane),
                                      LANE_INT(found->primitive, lane), LANE_INT(found->instance, lane), LANE(rays->to_t, lane));
@@ -55,7 +54,7 @@ kernel void query_any_hit(SCENE_PARAMETERS, QUERY_RAYS, global uchar *blocked, f
     if (first >= count) return;
     Rays rays = load_rays(origins, directions, t_max, unit, first, count);
     ireal found = ANY_HIT(&scene, rays.origin, rays.direction, rays.t_max, rays.valid);
-    bool ended = LOOPS_ENDED;
+    bool ended = loops_ended(first);
     for (uint lane = 0; lane < LANES && first + lane < count; ++lane)
         blocked[first + lane] = ended ? 2 : LANE_INT(found, lane) != 0;
 }

@@ -4,8 +4,7 @@
 // whose size the host computed for this BVH, so that it cannot overflow. count = 0 is an interior node, count > 0 a
 // leaf of triangles, count < 0 of spheres; first is the left child or the leaf's first primitive, in the top level of a
 // two-level BVH its instance.
-#include "geometry/box.cl"
-#include "traverse/leaf.cl"
+#include "traverse/slab_rays.cl"
 #include UPPER_LEVEL
 
 static inline float enter_box(const SlabRay *ray, global const Node *node, float t_max) {
@@ -33,12 +32,6 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int first, i
         hit_triangles(ray, RECORD(scene->leaf_triangles, i), stop_at_first, hit);
     }
 #endif
-}
-
-typedef struct { LeafRays leaves; SlabRays slabs; } TreeRays;
-
-static inline TreeRays tree_rays(const Scene *scene, real3 origin, real3 direction, real t_max) {
-    return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
 }
 
 static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,

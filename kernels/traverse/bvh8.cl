@@ -4,8 +4,7 @@
 // for this BVH, so that it cannot overflow. A child reference >= 0 is a node, < 0 is ~(first << 4 | sphere << 3 | count
 // − 1), a pack of triangles or `count` spheres, and in the top level of a two-level BVH an instance; empty slots have
 // inverted boxes.
-#include "geometry/box.cl"
-#include "traverse/leaf.cl"
+#include "traverse/slab_rays.cl"
 #include UPPER_LEVEL
 
 static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int reference, const bool stop_at_first, Hit *hit) {
@@ -40,12 +39,6 @@ static inline uint enter_boxes(const SlabRay *ray, global const Node *node, floa
     SLAB(2)
     vstore8(t_near, 0, entry);
     return mask_bits(t_near <= t_far);
-}
-
-typedef struct { LeafRays leaves; SlabRays slabs; } TreeRays;
-
-static inline TreeRays tree_rays(const Scene *scene, real3 origin, real3 direction, real t_max) {
-    return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
 }
 
 __attribute__((always_inline))

@@ -12,8 +12,7 @@
 // exact, and the rounding of the sum is within the margin of SLAB_PAD. The roundings of p − origin, and of plane − p
 // during the build, are below 3 ulps of p − origin; ORIGIN_PAD is 4. The product with 1/direction stays separate, at
 // one operation per plane, so that zeros and infinities behave as they do there.
-#include "geometry/box.cl"
-#include "traverse/leaf.cl"
+#include "traverse/slab_rays.cl"
 #include UPPER_LEVEL
 
 typedef struct { float step[3], near[3], far[3]; } Grid;   // the step, and p − origin for near and far planes
@@ -82,10 +81,9 @@ static inline void hit_primitive(const Scene *scene, const LeafRay *ray, int i, 
 #endif
 }
 
-typedef struct { LeafRays leaves; SlabRays slabs; } TreeRays;
-
-static inline TreeRays tree_rays(const Scene *scene, real3 origin, real3 direction, real t_max) {
-    return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
+// The octant into which a ray runs, a bit per axis.
+static inline uint octant(const SlabRay *ray) {
+    return (ray->backward[0] ? 0 : 1) | (ray->backward[1] ? 0 : 2) | (ray->backward[2] ? 0 : 4);
 }
 
 static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
@@ -93,7 +91,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
     SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
-    uint order = (slabs.backward[0] ? 0 : 1) | (slabs.backward[1] ? 0 : 2) | (slabs.backward[2] ? 0 : 4);
+    uint order = octant(&slabs);
     Group waiting[STACK_SIZE];
     Group nodes = {0, 0x80000000}, primitives;   // the root
     int top = 0;
@@ -133,7 +131,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
                 if (top == 0) return hit;
                 nodes = waiting[--top];
             }
-            order = (slabs.backward[0] ? 0 : 1) | (slabs.backward[1] ? 0 : 2) | (slabs.backward[2] ? 0 : 4);
+            order = octant(&slabs);
         }
 #endif
     }

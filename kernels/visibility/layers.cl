@@ -31,12 +31,6 @@ static inline Hits first_surface_from(const Scene *scene, const Hits *closest, r
     }
 }
 
-static inline Hits first_surface(const Scene *scene, real3 origin, real3 direction, int from_camera, ireal active,
-                                 Sampler *sampler, Surface *surface) {
-    Hits closest = closest_hit(scene, origin, direction, (real)(INFINITY), active);
-    return first_surface_from(scene, &closest, origin, direction, from_camera, active, sampler, surface);
-}
-
 // The transmittance to `origin` from the target on a light, or from infinity along wi. The ray ends where it hits that
 // light.
 static inline real transmittance(const Scene *scene, real3 origin, ireal light, real3 target, real3 wi, ireal infinite,

@@ -68,6 +68,15 @@ LAYER_PARTS = record(part="8f4")
 FILTER = np.dtype([("quantile", "f4")])
 
 
+class TextureNumber(int):
+    """Index of a texture, an int32 in records; −1 for none."""
+
+
+def texture_field(name: str) -> str:
+    """Return the name of the field with the texture of a parameter (kernels/bsdf/interface.cl)."""
+    return f"{name}_texture"
+
+
 def parameter_record(values: Iterable[Mapping[str, Any]]) -> np.dtype[Any]:
     """Return the record of materials or lights of one type, with these values by name: the union over all of them.
 
@@ -79,7 +88,7 @@ def parameter_record(values: Iterable[Mapping[str, Any]]) -> np.dtype[Any]:
     for named in values:
         for name, value in named.items():
             sizes[name] = max(sizes.get(name, 0), len(value) if isinstance(value, tuple) else 1)
-        scalar |= {name: "i4" if name.endswith("_texture") else "f4" for name in named}
+        scalar |= {name: "i4" if isinstance(value, TextureNumber) else "f4" for name, value in named.items()}
     triples = [name for name, size in sizes.items() if size == 3]
     scalars = [name for name, size in sizes.items() if size == 1]
     fields = {name: f"{size}f4" for name, size in sizes.items() if size > 3}

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any, ClassVar, Self
+from enum import Enum
+from functools import lru_cache
+from types import NoneType
+from typing import Annotated, Any, ClassVar, Self, get_args, get_origin, get_type_hints
 
 from ..render_settings import Culling
 from ..validation.limits import Ge, Le
@@ -86,11 +89,10 @@ class Material:
 
     def without_textures(self: Self) -> Self:
         """Return the material with each texture replaced by its factor."""
-        colors = {field.name for field in fields(self) if isinstance(field.default, tuple)}
-        maps = {field.name for field in fields(self) if field.default is None}
-        plain: dict[str, Any] = {name: as_color(value.factor) if name in colors else value.factor
-                                 for name, value in vars(self).items() if isinstance(value, Texture)}
-        return replace(self, **plain | dict.fromkeys(maps & plain.keys()))
+        plain: dict[str, Any] = {name: None if role is TextureRole.MAP else factor_of(getattr(self, name), role)
+                                 for name, role in texture_roles(type(self)).items()
+                                 if isinstance(getattr(self, name), Texture)}
+        return replace(self, **plain)
 
     @property
     def bent_by(self) -> Texture | None:
@@ -118,6 +120,33 @@ class Material:
 
 #: Fields that the material's own kernel file does not read.
 SHARED = frozenset(field.name for field in fields(Material))
+
+
+class TextureRole(Enum):
+    """What a texture in a field stands for: a color, a number, or a map, which has no plain value."""
+
+    COLOR = "color"
+    NUMBER = "number"
+    MAP = "map"
+
+
+@lru_cache
+def texture_roles(kind: type) -> dict[str, TextureRole]:
+    """Return the roles of the fields of a material type that accept textures, by the fields' types: `Albedo | Texture`,
+    `Unit | Texture` or `Texture | None`."""
+    roles: dict[str, TextureRole] = {}
+    for name, hint in get_type_hints(kind).items():
+        accepted = get_args(hint)
+        if Texture in accepted:
+            is_color = any(get_origin(part) is tuple for part in accepted)
+            roles[name] = (TextureRole.MAP if NoneType in accepted else
+                           TextureRole.COLOR if is_color else TextureRole.NUMBER)
+    return roles
+
+
+def factor_of(texture: Texture, role: TextureRole) -> float | Radiance:
+    """Return the texture's factor, three numbers for a color."""
+    return as_color(texture.factor) if role is TextureRole.COLOR else texture.factor
 
 
 def as_color(factor: float | Radiance) -> Radiance:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....scene.materials.layer_energy import ENTRY, Table
-from ....scene.materials.material import as_color
+from ....scene.materials.material import factor_of, texture_roles
 from ....scene.materials.material_types import MATERIALS, Material
 from ....scene.materials.textures import Texture
 from ....scene.render_settings import Culling
-from ..records import LAYER_PARTS, parameter_record
+from ..records import LAYER_PARTS, TextureNumber, parameter_record, texture_field
 from .pack_textures import PackedTextures
 
 Number = float | tuple[float, ...] | int
@@ -87,9 +87,10 @@ def pack_materials(users: Iterable[Material], textures: PackedTextures, tables: 
     for kind in used:
         values = [_values(material, textures, tables, culling) for material in distinct[kind]]
         records = np.zeros(len(values), parameter_record(values))
-        for name in records.dtype.names or ():
-            if name.endswith("_texture"):
-                records[name] = -1
+        names = {name for named in values for name in named}
+        textured = {name for named in values for name, value in named.items() if isinstance(value, TextureNumber)}
+        for name in textured:
+            records[name] = -1
         for i, (material, named) in enumerate(zip(distinct[kind], values)):
             plain = material.without_textures()     # fallback values, without textures
             for name in records.dtype.names or ():
@@ -100,24 +101,22 @@ def pack_materials(users: Iterable[Material], textures: PackedTextures, tables: 
                     else:
                         records[name][i] = value
         buffers[kind.kernel] = (kind.__name__, records)
-        names = {name for named in values for name in named}
-        reads |= {f"{kind.kernel}_{name}": f"{name}_texture" in names for name in sorted(names)
-                  if not name.endswith("_texture")}
+        reads |= {f"{kind.kernel}_{name}": texture_field(name) in textured for name in sorted(names - textured)}
     features = {kind: frozenset[str]().union(*(material.features() for material in distinct[kind])) for kind in used}
     return PackedMaterials(np.array(codes, np.int32), buffers, reads, used, features)
 
 
 def _values(material: Material, textures: PackedTextures, tables: MaterialTables,
             culling: Culling) -> dict[str, Number]:
-    """Return the values of its record: a texture's factor, and its number as NAME_texture; a table's first entry."""
+    """Return the values of its record: a texture's factor and its number, a table's first entry."""
     parameters = material.parameters()
     parameters |= material.surface_parameters(culling)
-    colors = {field.name for field in fields(material) if isinstance(field.default, tuple)}
+    roles = texture_roles(type(material))
     values: dict[str, Number] = {}
     for name, value in parameters.items():
         if isinstance(value, Texture):
-            values[name] = as_color(value.factor) if name in colors else value.factor
-            values[f"{name}_texture"] = textures.number(value)
+            values[name] = factor_of(value, roles[name])
+            values[texture_field(name)] = TextureNumber(textures.number(value))
         elif isinstance(value, Table):
             values[name] = float(tables.first(value))
         else:
