@@ -131,8 +131,11 @@ class PointLight(BaseLight):
 
 @dataclass(frozen=True, kw_only=True)
 class SpotLight(BaseLight):
-    """Spot light: `intensity` W/sr in a cone of `inner_degrees` around `direction`, falling to zero at `outer_degrees`
-    as in glTF's KHR_lights_punctual. `range`: as PointLight's."""
+    """Spot light.
+
+    `intensity`: W/sr in a cone of `inner_degrees` around `direction`, falling to zero at `outer_degrees` as in glTF's
+    KHR_lights_punctual. `range`: as PointLight's.
+    """
 
     kernel: ClassVar[str] = "spot"
     position: Vector
