@@ -134,6 +134,7 @@ def test_no_other_package_takes_part_in_samples() -> None:
         "accel",    # affects rounding only
         "device", "awake", "threads",    # compile and launch, in any order
         "formats",    # file names of scenes
+        "aov_types",    # names of AOVs; `direct_light`, which one needs, is a choice
         "errors", "option_fields", "file_names", "file_mode", "float_errors"}
 
 
