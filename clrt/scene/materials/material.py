@@ -130,10 +130,14 @@ class TextureRole(Enum):
     MAP = "map"
 
 
-@lru_cache
 def texture_roles(kind: type) -> dict[str, TextureRole]:
     """Return the roles of the fields of a material type that accept textures, by the fields' types: `Albedo | Texture`,
     `Unit | Texture` or `Texture | None`."""
+    return _texture_roles(kind)
+
+
+@lru_cache
+def _texture_roles(kind: type) -> dict[str, TextureRole]:
     roles: dict[str, TextureRole] = {}
     for name, hint in get_type_hints(kind).items():
         accepted = get_args(hint)
