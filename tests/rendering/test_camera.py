@@ -224,14 +224,15 @@ static inline ireal ray_through(const Launch *launch, real sx, real sy, Sampler 
 """
 
 
-@pytest.mark.parametrize("paths", ["waves", "lanes"])
-def test_a_camera_may_have_no_ray(device: Device, paths: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("paths, lanes", [("waves", 8), ("lanes", 8), ("lanes", 1)])
+def test_a_camera_may_have_no_ray(device: Device, paths: str, lanes: int, tmp_path: Path,
+                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a camera with rays in its right half alone, that half is the pinhole's and the other is black, in the image,
     its AOVs, the denoiser's guides and the record of paths; samples are counted in both, rays only in one."""
     sky, red = Environment(color=(1.0, 2.0, 3.0)), Diffuse(color=(0.7, 0.2, 0.1), emission=(0.1, 0.1, 0.1))
     scene = Scene(spheres=[Sphere(material=red)], environment=sky, camera=Camera(),
                   render=RenderSettings(size=(32, 16), spp=4))
-    options: dict[str, Any] = {"device": device.info.index, "paths": paths, "lanes": 8, "first_hits": True,
+    options: dict[str, Any] = {"device": device.info.index, "paths": paths, "lanes": lanes, "first_hits": True,
                                "aovs": "albedo,normal,position,depth,object,direct,indirect,samples"}
 
     def rendered() -> tuple[dict[str, NDArray[np.generic]], int]:
@@ -253,7 +254,7 @@ def test_a_camera_may_have_no_ray(device: Device, paths: str, tmp_path: Path, mo
         assert np.all(picture[:, :16] == nothing), name
     assert fewer == pytest.approx(rays / 2, rel=0.05) and whole["image"][:, :16].all()
     for column, black in ((2, True), (29, False)):
-        traced = trace_pixel(scene, device, (column, 8), Choices(lanes=8))
+        traced = trace_pixel(scene, device, (column, 8), Choices(lanes=lanes))
         assert len(traced.starts) == 4 and np.all(traced.rows["end"] == PathEnd.ESCAPED)
         np.testing.assert_allclose(traced.value, 0 if black else sky.color, rtol=1e-6)
 

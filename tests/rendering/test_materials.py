@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
-from typing import Any, get_args, get_type_hints
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from clrt.bench.numerics.bsdf_cases import variants
 from clrt.rendering.compile.materials.pack_materials import MaterialTables, pack_materials
 from clrt.rendering.compile.materials.pack_textures import PackedTextures
-from clrt.scene.materials.material_types import MATERIALS, Material
-from clrt.scene.materials.textures import Picture, Texture
+from clrt.scene.materials.material import TextureRole, texture_roles
+from clrt.scene.materials.material_types import MATERIALS, Albedo, Material
+from clrt.scene.materials.textures import WHITE, Picture, Texture
 
 from ..covering import covering
 
@@ -31,6 +32,25 @@ def textured(kind: type[Material], rng: np.random.Generator) -> Material:
         material = replace(chosen[int(rng.integers(len(chosen)))], **found)
         if not material.conflicts():
             return material
+
+
+@dataclass(frozen=True, kw_only=True)
+class Painted(Material):
+    """A material whose color is textured unless another is given, and whose fields have names like kernel fields."""
+
+    kernel: ClassVar[str] = "painted"
+    color: Albedo | Texture = Texture(picture=WHITE, factor=0.5)
+    grain_texture: float = 0.25
+    bumps: Texture | None = Texture(picture=WHITE)
+
+
+def test_roles_of_textures_are_those_of_the_types() -> None:
+    """Neither a default value nor a name changes them."""
+    roles = texture_roles(Painted)
+    assert (roles["color"], roles["bumps"]) == (TextureRole.COLOR, TextureRole.MAP) and "grain_texture" not in roles
+    assert (roles["emission"], roles["opacity"]) == (TextureRole.COLOR, TextureRole.NUMBER)
+    plain = Painted().without_textures()
+    assert (plain.color, plain.bumps, plain.grain_texture) == ((0.5, 0.5, 0.5), None, 0.25)
 
 
 def names_of(records: NDArray[Any]) -> set[str]:
