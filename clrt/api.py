@@ -38,10 +38,10 @@ def load(path: StrPath, camera: str | None = None) -> Scene:
 def render(scene: Scene | StrPath, *, time: float | None = None, error: float | None = None,
            reference: NDArray[np.float32] | None = None, denoise: bool = False,
            **options: Unpack[RendererOptions]) -> Image:
-    """Render a scene, or the scene in a file, until a stop condition.
+    """Render a scene, or the scene in a file, until `spp`, `time` or `error` is reached.
 
-    See `Renderer.passes` for spp, time, error and reference. denoise: see docs/denoise.md; the image keeps its `raw`
-    pixels. Raises subclasses of ClrtError.
+    These and `reference` are as in `Renderer.passes`. denoise: see docs/denoise.md; the image keeps its `raw` pixels.
+    Raises subclasses of ClrtError.
     """
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)

@@ -94,7 +94,10 @@ def drawn(rooms: Sequence[str] = ROOMS) -> str:
     bottom = TOP + STEP * len(ROWS)
     parts = [box("opencl" if name in KNOW_OPENCL else "box", name, text, x, TOP + STEP * number, end)
              for number, boxes in enumerate(ROWS) for name, text, x, end in boxes]
-    parts.append(box("box", " · ".join(small), "", 350, bottom, 960))
+    half = (len(small) + 1) // 2
+    parts.append(f'<rect class="box" x="350" y="{bottom}" width="610" height="{HEIGHT}" rx="6"/>')
+    parts += [f'<text x="655" y="{bottom + y}">{" · ".join(names)}</text>'
+              for y, names in ((20, small[:half]), (37, small[half:]))]
     first = row("output") - HEIGHT // 2
     levels = [first + STEP * number for number in range(len(KERNELS))]
     parts.append(f'<rect class="panel" x="22" y="{first - 34}" width="270" height="{bottom + HEIGHT - first + 48}" '

@@ -11,7 +11,7 @@ import inspect
 import re
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 
@@ -31,19 +31,22 @@ class Written(str):
 
     def __new__(cls, annotation: object) -> Written:
         names = "|".join(sorted(clrt.__all__, key=len, reverse=True))
-        return super().__new__(cls, re.sub(rf"(?<![\w.\"])({names})(?!\w)", r"clrt.\1", str(annotation)))
+        text = annotation if isinstance(annotation, str) else inspect.formatannotation(annotation)
+        return super().__new__(cls, re.sub(rf"(?<![\w.\"'])({names})(?![\w\"'])", r"clrt.\1", text))
 
     __repr__ = str.__str__
 
 
-def describe_function(page: pdoc.doc.Function) -> None:
-    """Show annotations as written, such as ArrayLike, not as what they stand for."""
-    written = inspect.signature(page.obj)
-    parameters = [parameter.replace(annotation=Written(written.parameters[name].annotation))
-                  if parameter.annotation is not parameter.empty else parameter
-                  for name, parameter in page.signature.parameters.items()]
+def describe_function(page: pdoc.doc.Function, function: Callable[..., object]) -> None:
+    """Show what help() shows of a function: annotations as written, such as ArrayLike, and what decorators add."""
+    written = inspect.signature(function)
+    parameters = [parameter if parameter.annotation is parameter.empty
+                  else parameter.replace(annotation=Written(parameter.annotation))
+                  for parameter in written.parameters.values()]
     returned = inspect.Signature.empty if page.name == "__init__" else Written(written.return_annotation)
     vars(page)["signature"] = page.signature.replace(parameters=parameters, return_annotation=returned)
+    if page.name != "__init__":     # whose class has the docstring
+        vars(page)["docstring"] = inspect.getdoc(function) or ""
     vars(page)["decorators"] = [each for each in page.decorators if each in ("@classmethod", "@staticmethod")]
 
 
@@ -62,7 +65,7 @@ def describe_class(page: pdoc.doc.Class) -> None:
     for member in members:
         attribute = inspect.getattr_static(page.obj, member.name, None)
         if isinstance(member, pdoc.doc.Function):
-            describe_function(member)
+            describe_function(member, getattr(page.obj, member.name))
         elif isinstance(member, pdoc.doc.Variable) and isinstance(attribute, property):
             vars(member)["annotation_str"] = f": {Written(attribute.fget.__annotations__['return'])}"
     vars(page)["own_members"] = members
@@ -79,7 +82,7 @@ def api(module: ModuleType) -> pdoc.doc.Module:
         if isinstance(each, pdoc.doc.Class):
             describe_class(each)
         elif isinstance(each, pdoc.doc.Function):
-            describe_function(each)
+            describe_function(each, getattr(module, each.name))
     return page
 
 

@@ -91,4 +91,5 @@ def test_every_command_and_option_is_in_the_reference(folder: Path) -> None:
 def test_annotations_are_as_written(folder: Path) -> None:
     """Not as what their names stand for, such as numpy's dozen types of ArrayLike."""
     text = words((folder / "clrt.html").read_text(encoding="utf-8"))
+    assert "onphase: Callable[[str], None] | None" in text      # one of Renderer's keywords, which a decorator adds
     assert "origins: ArrayLike" in text and "fovdegrees: Annotated[float, Gt(0), Lt(180)]" in text

@@ -25,7 +25,7 @@ class PictureOptions(TypedDict, total=False):
     """Fields of RenderSettings; those left out, or None, are the scene's."""
 
     size: tuple[int, int] | None
-    spp: Annotated[int | None, "Planned samples per pixel: the sampler makes neighbouring pixels' errors differ at "
+    spp: Annotated[int | None, "Planned samples per pixel: the sampler makes neighboring pixels' errors differ at "
                                "this count and starts afresh after it (kernels/sampler); `passes` stops there."]
     max_depth: int | None
     seed: int | None

@@ -131,10 +131,9 @@ class PointLight(BaseLight):
 
 @dataclass(frozen=True, kw_only=True)
 class SpotLight(BaseLight):
-    """Spot light.
+    """Spot light of `intensity` W/sr in a cone around `direction`.
 
-    `intensity`: W/sr in a cone of `inner_degrees` around `direction`, falling to zero at `outer_degrees` as in glTF's
-    KHR_lights_punctual. `range`: as PointLight's.
+    It falls from `inner_degrees` to zero at `outer_degrees` as in glTF's KHR_lights_punctual. `range`: as PointLight's.
     """
 
     kernel: ClassVar[str] = "spot"

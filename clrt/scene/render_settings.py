@@ -20,11 +20,16 @@ NonNegative = Annotated[float, Ge(0)]
 
 @dataclass(frozen=True, kw_only=True)
 class RenderSettings:
-    """Default render settings of a scene. `size`: (width, height). `max_depth`: maximum path depth, 1 = emission only,
-    2 = direct light, 3 = one bounce. shadows: whether the local and raster integrators cast them. back_face_culling:
-    which rays ignore the back faces of materials that are not double_sided: "none", those of the "camera", or "all".
-    clamp_direct, clamp_indirect: upper limits per channel of one contribution to a sample, for paths of at most two
-    edges and for longer ones, in the path and direct integrators; 0 does not clamp."""
+    """Default render settings of a scene.
+
+    - size: (width, height) in pixels
+    - max_depth: maximum path depth: 1 emission only, 2 direct light, 3 one bounce
+    - shadows: whether the integrators local and raster cast shadow rays
+    - back_face_culling: which rays ignore the back faces of materials that are not double_sided: "none", those of the
+      "camera", or "all"
+    - clamp_direct, clamp_indirect: upper limits per channel of one contribution to a sample, for paths of depth 2 at
+      most and for longer ones, in the integrators path and direct; 0 does not clamp
+    """
 
     size: tuple[Pixels, Pixels] = option((512, 512), "Image size in pixels.")
     spp: Annotated[int, Ge(1)] = option(64, "Samples per pixel.")
