@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         Scene as Scene,
         Sphere as Sphere,
     )
+
     __version__: str
 
 _HOME = {
@@ -65,10 +66,18 @@ _HOME = {
     "output.images": ("read_image",),
     "queries.mesh": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
-    "scene.animation": ("Animation", "Keyframe"), "scene.camera_path": ("frames", "turntable"),
+    "scene.animation": ("Animation", "Keyframe"),
+    "scene.camera_path": ("frames", "turntable"),
     "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
-    "scene.materials.material_types": ("BlinnPhong", "Conductor", "Dielectric", "Diffuse", "MetallicRoughness",
-                                       "Mirror", "Phong"),
+    "scene.materials.material_types": (
+        "BlinnPhong",
+        "Conductor",
+        "Dielectric",
+        "Diffuse",
+        "MetallicRoughness",
+        "Mirror",
+        "Phong",
+    ),
     "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
     "scene.materials.textures": ("Picture", "Texture"),
 }

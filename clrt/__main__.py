@@ -9,7 +9,7 @@ from contextlib import suppress
 def main() -> None:
     """Run the command line; an interrupt during startup ends it as quietly as a later one."""
     code: list[int] = []
-    atexit.register(_end, code)     # registered before all others, so called after them
+    atexit.register(_end, code)  # registered before all others, so called after them
     try:
         from .cli import main as run
         from .device.programs import background_compile
@@ -27,7 +27,7 @@ def main() -> None:
 def _end(code: list[int]) -> None:
     """Exit the process at once: interpreter shutdown takes a thirtieth of a short render, and some drivers crash when
     they are unloaded, after all work is done."""
-    with suppress(OSError, ValueError, AttributeError):     # standard output may be missing or closed
+    with suppress(OSError, ValueError, AttributeError):  # standard output may be missing or closed
         sys.stdout.flush()
         sys.stderr.flush()
         if code:

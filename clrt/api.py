@@ -35,9 +35,15 @@ def load(path: StrPath, camera: str | None = None) -> Scene:
 
 @listed(RendererOptions, SETTINGS)
 @with_default_errors
-def render(scene: Scene | StrPath, *, time: float | None = None, error: float | None = None,
-           reference: NDArray[np.float32] | None = None, denoise: bool = False,
-           **options: Unpack[RendererOptions]) -> Image:
+def render(
+    scene: Scene | StrPath,
+    *,
+    time: float | None = None,
+    error: float | None = None,
+    reference: NDArray[np.float32] | None = None,
+    denoise: bool = False,
+    **options: Unpack[RendererOptions],
+) -> Image:
     """Render a scene, or the scene in a file, until `spp`, `time` or `error` is reached.
 
     These and `reference` are as in `Renderer.passes`. denoise: see docs/denoise.md; the image keeps its `raw` pixels.
@@ -50,9 +56,15 @@ def render(scene: Scene | StrPath, *, time: float | None = None, error: float | 
 
 
 @listed(RendererOptions, SETTINGS)
-def animate(scene: Scene | StrPath, *, frames: Iterable[int] | None = None, time: float | None = None,
-            error: float | None = None, denoise: bool = False,
-            **options: Unpack[RendererOptions]) -> Iterator[tuple[int, Image]]:
+def animate(
+    scene: Scene | StrPath,
+    *,
+    frames: Iterable[int] | None = None,
+    time: float | None = None,
+    error: float | None = None,
+    denoise: bool = False,
+    **options: Unpack[RendererOptions],
+) -> Iterator[tuple[int, Image]]:
     """Render a scene with camera animation, all `frames` or the given numbers; yields each frame's number and image.
 
     The other arguments are as in `render`, per frame. Raises SceneError if the scene has no animation, and subclasses
@@ -84,8 +96,9 @@ def _renderer(scene: Scene, stops: Stops, denoise: bool, options: RendererOption
 
 
 @with_default_errors
-def _rendered(renderer: Renderer, denoiser: Denoiser | None, reference: NDArray[np.float32] | None,
-              stops: Stops) -> Image:
+def _rendered(
+    renderer: Renderer, denoiser: Denoiser | None, reference: NDArray[np.float32] | None, stops: Stops
+) -> Image:
     if denoiser:
         check_denoisable(renderer.settings.integrator)
     guides = renderer.session.guides() if denoiser else {}

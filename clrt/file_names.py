@@ -24,7 +24,7 @@ def _as_bytes(error: UnicodeError) -> tuple[str | bytes, int]:
 
 def _shown(error: UnicodeError) -> tuple[str, int]:
     assert isinstance(error, UnicodeEncodeError)
-    text = printable(error.object[error.start:error.end])
+    text = printable(error.object[error.start : error.end])
     return text.encode("ascii", "backslashreplace").decode(), error.end
 
 

@@ -21,6 +21,7 @@ def default_errors() -> np.errstate:
 
 def with_default_errors(function: F) -> F:
     """Decorate the function to run in that context."""
+
     @wraps(function)
     def inside(*arguments: Any, **named: Any) -> Any:
         with default_errors():

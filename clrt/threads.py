@@ -35,7 +35,7 @@ class Bell:
 
     def ring(self) -> None:
         """End the current wait, or the next one."""
-        with suppress(RuntimeError):    # already rung
+        with suppress(RuntimeError):  # already rung
             self._lock.release()
 
     def wait(self, seconds: float) -> None:

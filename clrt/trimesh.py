@@ -73,8 +73,9 @@ class RayMeshIntersector:
     def __init__(self, mesh: Any, scale_to_box: bool = True, *, device: str | int | None = None) -> None:
         """Build nothing yet: a trimesh primitive creates its faces on first access."""
         if not (hasattr(type(mesh), "vertices") and hasattr(type(mesh), "faces")):
-            raise UsageError(f"mesh is a {type(mesh).__name__} and has no faces; give a trimesh.Trimesh, for a Scene "
-                             "scene.to_mesh()")
+            raise UsageError(
+                f"mesh is a {type(mesh).__name__} and has no faces; give a trimesh.Trimesh, for a Scene scene.to_mesh()"
+            )
         self.mesh = mesh
         self._device = device
         self._built: tuple[int, RayQuery] | None = None
@@ -88,8 +89,14 @@ class RayMeshIntersector:
         return self._built[1]
 
     @with_default_errors
-    def intersects_id(self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True,
-                      max_hits: int | None = None, return_locations: bool = False) -> tuple[Any, ...]:
+    def intersects_id(
+        self,
+        ray_origins: ArrayLike,
+        ray_directions: ArrayLike,
+        multiple_hits: bool = True,
+        max_hits: int | None = None,
+        return_locations: bool = False,
+    ) -> tuple[Any, ...]:
         """Return index_tri, index_ray (m,) int64, sorted along each ray; optionally locations (m, 3) float64.
 
         Returns one triangle per location where a ray hits the mesh; an edge, a vertex and coincident surfaces are one
@@ -102,11 +109,13 @@ class RayMeshIntersector:
         t = hits.t[:, None]
         return hits.triangle, hits.ray, rays.origins[hits.ray] + t * rays.directions[hits.ray]
 
-    def intersects_location(self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True,
-                            max_hits: int | None = None) -> tuple[Doubles, Indices, Indices]:
+    def intersects_location(
+        self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True, max_hits: int | None = None
+    ) -> tuple[Doubles, Indices, Indices]:
         """Return locations (m, 3) float64, index_ray (m,) int64, index_tri (m,) int64: see `intersects_id`."""
-        triangle, ray, locations = self.intersects_id(ray_origins, ray_directions, multiple_hits=multiple_hits,
-                                                      max_hits=max_hits, return_locations=True)
+        triangle, ray, locations = self.intersects_id(
+            ray_origins, ray_directions, multiple_hits=multiple_hits, max_hits=max_hits, return_locations=True
+        )
         return locations, ray, triangle
 
     @with_default_errors
@@ -150,7 +159,7 @@ class RayMeshIntersector:
         """Return the first hit of each ray that hits the mesh."""
         found = self.query.closest_hit(rays.begins(), rays.directions)
         t = found["t"] - _BACK * rays.size
-        met, close = found["primitive"] >= 0, t < 2 * _BACK * rays.size      # perhaps before the origin
+        met, close = found["primitive"] >= 0, t < 2 * _BACK * rays.size  # perhaps before the origin
         ray, others = np.flatnonzero(met & ~close), np.flatnonzero(met & close)
         hits = self._located(rays, found["primitive"][ray], ray, t[ray])
         if not len(others):

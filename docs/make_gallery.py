@@ -18,13 +18,22 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 #: Rows of the gallery. A row is as wide as the gallery, its pictures equally high. (The furnace is an even grey.)
-ROWS = [["textures", "night", "instances"], ["spheres", "caustics", "cornell", "tree"],
-        ["depth_of_field", "sunlit", "dragon", "spot"], ["mirrors", "materials", "local", "glass"]]
+ROWS = [
+    ["textures", "night", "instances"],
+    ["spheres", "caustics", "cornell", "tree"],
+    ["depth_of_field", "sunlit", "dragon", "spot"],
+    ["mirrors", "materials", "local", "glass"],
+]
 #: Pixels: the gallery's width, the gap between its pictures, and the height of a picture of its own.
 WIDTH, GAP, HEIGHT = 1280, 6, 320
 #: Samples a pixel where the denoiser has little to do with fewer than a scene asks for, and what an eye sees best.
-OPTIONS = {"caustics": ["--spp", "512"], "cornell": ["--exposure", "1.5"], "glass": ["--exposure", "1"],
-           "local": ["--spp", "16"], "night": ["--view", "agx", "--exposure", "1"]}
+OPTIONS = {
+    "caustics": ["--spp", "512"],
+    "cornell": ["--exposure", "1.5"],
+    "glass": ["--exposure", "1"],
+    "local": ["--spp", "16"],
+    "night": ["--view", "agx", "--exposure", "1"],
+}
 USUAL = ["--spp", "128"]
 LARGEST = 300_000
 
@@ -35,8 +44,21 @@ def rendered(name: str, folder: Path) -> NDArray[np.uint8]:
 
     width, height = clrt.load(str(ROOT / "scenes" / f"{name}.toml")).render.size
     file = folder / f"{name}.png"
-    command = [sys.executable, "-m", "clrt", "render", ROOT / "scenes" / f"{name}.toml", *USUAL, *OPTIONS.get(name, []),
-               "--size", f"{round(HEIGHT * width / height)}x{HEIGHT}", "--denoise", "-q", "-o", file]
+    command = [
+        sys.executable,
+        "-m",
+        "clrt",
+        "render",
+        ROOT / "scenes" / f"{name}.toml",
+        *USUAL,
+        *OPTIONS.get(name, []),
+        "--size",
+        f"{round(HEIGHT * width / height)}x{HEIGHT}",
+        "--denoise",
+        "-q",
+        "-o",
+        file,
+    ]
     subprocess.run(command, check=True)
     return np.asarray(iio.imread(file)[..., :3])
 
@@ -63,8 +85,10 @@ def gallery() -> NDArray[np.uint8]:
         ends = np.round(np.cumsum([0, *widths]) / widths.sum() * (WIDTH - GAP * (len(row) - 1))).astype(int)
         gap = np.full((height, GAP, 3), 255, np.uint8)
         parts = [resized(picture, width, height) for picture, width in zip(pictures, np.diff(ends))]
-        lines += [np.hstack([part for each in parts for part in (each, gap)][:-1]),
-                  np.full((GAP, WIDTH, 3), 255, np.uint8)]
+        lines += [
+            np.hstack([part for each in parts for part in (each, gap)][:-1]),
+            np.full((GAP, WIDTH, 3), 255, np.uint8),
+        ]
     return np.vstack(lines[:-1])
 
 

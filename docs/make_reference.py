@@ -40,12 +40,15 @@ class Written(str):
 def describe_function(page: pdoc.doc.Function, function: Callable[..., object]) -> None:
     """Show what help() shows of a function: annotations as written, such as ArrayLike, and what decorators add."""
     written = inspect.signature(function)
-    parameters = [parameter if parameter.annotation is parameter.empty
-                  else parameter.replace(annotation=Written(parameter.annotation))
-                  for parameter in written.parameters.values()]
+    parameters = [
+        parameter
+        if parameter.annotation is parameter.empty
+        else parameter.replace(annotation=Written(parameter.annotation))
+        for parameter in written.parameters.values()
+    ]
     returned = inspect.Signature.empty if page.name == "__init__" else Written(written.return_annotation)
     vars(page)["signature"] = page.signature.replace(parameters=parameters, return_annotation=returned)
-    if page.name != "__init__":     # whose class has the docstring
+    if page.name != "__init__":  # whose class has the docstring
         vars(page)["docstring"] = inspect.getdoc(function) or ""
     vars(page)["decorators"] = [each for each in page.decorators if each in ("@classmethod", "@staticmethod")]
 
@@ -56,12 +59,19 @@ def describe_class(page: pdoc.doc.Class) -> None:
     That is the fields of a dataclass. Fields are all that users need of materials and lights, which name their kernel:
     their methods serve the renderer.
     """
-    bases = [base for base in page.obj.__mro__[1:] if base.__module__.startswith("clrt.")
-             and base.__name__ not in clrt.__all__]
+    bases = [
+        base
+        for base in page.obj.__mro__[1:]
+        if base.__module__.startswith("clrt.") and base.__name__ not in clrt.__all__
+    ]
     fields = {field.name for field in dataclasses.fields(page.obj)} if dataclasses.is_dataclass(page.obj) else set()
-    members = [member for name, member in page.members.items()
-               if member.taken_from[0].startswith("clrt") and name not in fields
-               and (name == "__init__" or not hasattr(page.obj, "kernel"))]
+    members = [
+        member
+        for name, member in page.members.items()
+        if member.taken_from[0].startswith("clrt")
+        and name not in fields
+        and (name == "__init__" or not hasattr(page.obj, "kernel"))
+    ]
     for member in members:
         attribute = inspect.getattr_static(page.obj, member.name, None)
         if isinstance(member, pdoc.doc.Function):
@@ -76,7 +86,7 @@ def describe_class(page: pdoc.doc.Class) -> None:
 def api(module: ModuleType) -> pdoc.doc.Module:
     """Return the documentation of a module's public names."""
     for name in getattr(module, "__all__", ()):
-        getattr(module, name)       # clrt's are imported on first use; pdoc looks only at what is there
+        getattr(module, name)  # clrt's are imported on first use; pdoc looks only at what is there
     page = pdoc.doc.Module(module)
     for each in page.members.values():
         if isinstance(each, pdoc.doc.Class):
@@ -88,8 +98,14 @@ def api(module: ModuleType) -> pdoc.doc.Module:
 
 def helps(command: click.Command, path: str, parent: click.Context | None = None) -> Iterator[str]:
     """Yield a section for a command and each command below it."""
-    with click.Context(command, info_name=path.split()[-1], parent=parent, max_content_width=WIDTH,
-                       terminal_width=WIDTH, **command.context_settings) as context:
+    with click.Context(
+        command,
+        info_name=path.split()[-1],
+        parent=parent,
+        max_content_width=WIDTH,
+        terminal_width=WIDTH,
+        **command.context_settings,
+    ) as context:
         yield f"{'#' * len(path.split())}# {path}\n\n```text\n{command.get_help(context)}\n```\n"
         if isinstance(command, click.Group):
             for name in command.list_commands(context):
@@ -106,7 +122,7 @@ def command_line() -> pdoc.doc.Module:
 
 def main(folder: Path = FOLDER) -> None:
     pdoc.render.configure(show_source=False, footer_text=f"clrt {clrt.__version__}")
-    with warnings.catch_warnings():     # pdoc tries to evaluate annotations that base classes have in other modules
+    with warnings.catch_warnings():  # pdoc tries to evaluate annotations that base classes have in other modules
         warnings.filterwarnings("ignore", "Error parsing type annotation")
         pages = {page.fullname: page for page in (api(clrt), api(clrt.trimesh), command_line())}
     texts = {f"{name.replace('.', '/')}.html": pdoc.render.html_module(page, pages) for name, page in pages.items()}

@@ -27,8 +27,9 @@ DISPLAY_VARIABLES = ("CI", "COLUMNS", "FORCE_COLOR", "LINES", "NO_COLOR")
 def pytest_configure(config: pytest.Config) -> None:
     """Refuse to run if the installed clrt comes from another tree, and set PoCL's cache folder."""
     if not hasattr(config, "workerinput") and (name := other_file()) is not None:
-        raise pytest.UsageError(f"the installed clrt is not this tree's ({name} differs): "
-                                "run `pip install --editable '.[test]'`")
+        raise pytest.UsageError(
+            f"the installed clrt is not this tree's ({name} differs): run `pip install --editable '.[test]'`"
+        )
     # PoCL's programs are cached in pytest's cache, for all processes of this run and for later runs.
     assert config.cache is not None
     os.environ["POCL_CACHE_DIR"] = str(config.cache.mkdir("pocl"))
@@ -62,8 +63,13 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         from clrt.device.discovery.discover import find_devices
 
         found = [info for info, _ in find_devices() if info.usable and info.type != "simulator"]
-        metafunc.parametrize("device", [info.index for info in found], indirect=True, scope="session",
-                             ids=[f"{info.platform}-{info.name}".replace(" ", "_") for info in found])
+        metafunc.parametrize(
+            "device",
+            [info.index for info in found],
+            indirect=True,
+            scope="session",
+            ids=[f"{info.platform}-{info.name}".replace(" ", "_") for info in found],
+        )
 
 
 @pytest.fixture(scope="session", autouse=True)

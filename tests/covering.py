@@ -19,16 +19,22 @@ def covering(names: str, *factors: Iterable[Any], strength: int = 1) -> pytest.M
     """
     values = [list(factor) for factor in factors]
     chosen = covering_array([len(each) for each in values], strength)
-    return pytest.mark.parametrize(names, [
-        pytest.param(*(each[i] for each, i in zip(values, row)),
-                     marks=() if row in chosen else pytest.mark.combinations)
-        for row in product(*(range(len(each)) for each in values))])
+    return pytest.mark.parametrize(
+        names,
+        [
+            pytest.param(
+                *(each[i] for each, i in zip(values, row)), marks=() if row in chosen else pytest.mark.combinations
+            )
+            for row in product(*(range(len(each)) for each in values))
+        ],
+    )
 
 
 def others(*cases: Any) -> list[Any]:
     """Return parameters (tuples if there are several) that do not run by default but are marked `combinations`."""
-    return [pytest.param(*(case if isinstance(case, tuple) else [case]), marks=pytest.mark.combinations)
-            for case in cases]
+    return [
+        pytest.param(*(case if isinstance(case, tuple) else [case]), marks=pytest.mark.combinations) for case in cases
+    ]
 
 
 def covering_array(sizes: Sequence[int], strength: int) -> set[Row]:
@@ -36,6 +42,7 @@ def covering_array(sizes: Sequence[int], strength: int) -> set[Row]:
 
     Greedy: adds the row with the most missing combinations; ties go to the first.
     """
+
     def held(row: Row) -> set[Any]:
         return set(combinations(enumerate(row), strength))
 

@@ -35,12 +35,70 @@ LARGEST = 300_000
 PICTURES = (".hdr", ".exr", ".png", ".jpg")
 FORMATS = (".toml", ".glb", ".gltf", ".obj", ".mtl", ".ply", ".stl", ".off", *PICTURES)
 GOOD = ("picture", "error")
-NUMBERS = ["-1", "0", "1", "2", "255", "65536", "2147483647", "4294967296", "99999999999999999999", "1e39", "1e-40",
-           "-1e308", "nan", "inf", "0x10", "1.5", "", "true", "null", '"x"', "[]", "{}"]
-VALUES: list[Any] = [None, -1, 0, 1, 3, 255, 2**31, 2**63, 1e39, 1.5, True, "", "x", [], [0], {}, {"x": 1}, "../x.bin",
-                     "data:application/octet-stream;base64,AAAA", 5121, 5126, "VEC3", "SCALAR"]
-BYTES = [b"\0", b"\xff", b"\x7f", b"\x80", b"\n", b" ", b"\xff\xff\xff\x7f", b"\xff\xff\xff\xff", b"\0\0\xc0\x7f",
-         b"\0\0\x80\x7f", b"\xff\xff\x7f\x7f", b"\1\0\0\0", b"\0" * 8]
+NUMBERS = [
+    "-1",
+    "0",
+    "1",
+    "2",
+    "255",
+    "65536",
+    "2147483647",
+    "4294967296",
+    "99999999999999999999",
+    "1e39",
+    "1e-40",
+    "-1e308",
+    "nan",
+    "inf",
+    "0x10",
+    "1.5",
+    "",
+    "true",
+    "null",
+    '"x"',
+    "[]",
+    "{}",
+]
+VALUES: list[Any] = [
+    None,
+    -1,
+    0,
+    1,
+    3,
+    255,
+    2**31,
+    2**63,
+    1e39,
+    1.5,
+    True,
+    "",
+    "x",
+    [],
+    [0],
+    {},
+    {"x": 1},
+    "../x.bin",
+    "data:application/octet-stream;base64,AAAA",
+    5121,
+    5126,
+    "VEC3",
+    "SCALAR",
+]
+BYTES = [
+    b"\0",
+    b"\xff",
+    b"\x7f",
+    b"\x80",
+    b"\n",
+    b" ",
+    b"\xff\xff\xff\x7f",
+    b"\xff\xff\xff\xff",
+    b"\0\0\xc0\x7f",
+    b"\0\0\x80\x7f",
+    b"\xff\xff\x7f\x7f",
+    b"\1\0\0\0",
+    b"\0" * 8,
+]
 
 
 Change = Callable[[bytes, random.Random], bytes]
@@ -57,8 +115,13 @@ def case(seeds: list[Path], number: int) -> tuple[Path, bytes]:
     content = seed.read_bytes()
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         document = seed.suffix in (".glb", ".gltf") and rng.random() < 0.5
-        change = _json if document else rng.choice((_numbers, _numbers, _cut, _repeated, _overwritten, _overwritten,
-                                                    _flipped, _truncated, _lines))
+        change = (
+            _json
+            if document
+            else rng.choice(
+                (_numbers, _numbers, _cut, _repeated, _overwritten, _overwritten, _flipped, _truncated, _lines)
+            )
+        )
         inside = content.startswith(b"glTF") and (document or rng.random() < 0.7)
         content = _in_chunk(content, change, rng) if inside else change(content, rng)
     return seed, content
@@ -66,15 +129,19 @@ def case(seeds: list[Path], number: int) -> tuple[Path, bytes]:
 
 def _in_chunk(content: bytes, change: Change, rng: random.Random) -> bytes:
     """Change the JSON chunk of a .glb file, or its binary chunk in 1 of 4 cases, and correct the chunk lengths."""
-    size, = struct.unpack_from("<I", content.ljust(16, b"\0"), 12)
-    text, rest = content[20:20 + size], content[28 + size:]
+    (size,) = struct.unpack_from("<I", content.ljust(16, b"\0"), 12)
+    text, rest = content[20 : 20 + size], content[28 + size :]
     if change is not _json and rng.random() < 0.25:
         rest = change(rest, rng)
     else:
         text = change(text, rng)
         text += b" " * (-len(text) % 4)
-    return (struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(rest), len(text), b"JSON") + text
-            + struct.pack("<I4s", len(rest), b"BIN\0") + rest)
+    return (
+        struct.pack("<4sIII4s", b"glTF", 2, 28 + len(text) + len(rest), len(text), b"JSON")
+        + text
+        + struct.pack("<I4s", len(rest), b"BIN\0")
+        + rest
+    )
 
 
 def _place(content: bytes, rng: random.Random) -> int:
@@ -91,17 +158,17 @@ def _numbers(content: bytes, rng: random.Random) -> bytes:
 
 def _cut(content: bytes, rng: random.Random) -> bytes:
     start = _place(content, rng)
-    return content[:start] + content[start + rng.choice((1, 2, 4, 16, 200)):]
+    return content[:start] + content[start + rng.choice((1, 2, 4, 16, 200)) :]
 
 
 def _repeated(content: bytes, rng: random.Random) -> bytes:
     start = _place(content, rng)
-    return content[:start] + content[start:start + rng.choice((1, 4, 40))] * rng.choice((2, 3, 50)) + content[start:]
+    return content[:start] + content[start : start + rng.choice((1, 4, 40))] * rng.choice((2, 3, 50)) + content[start:]
 
 
 def _overwritten(content: bytes, rng: random.Random) -> bytes:
     start, new = _place(content, rng), rng.choice(BYTES)
-    return content[:start] + new + content[start + len(new):]
+    return content[:start] + new + content[start + len(new) :]
 
 
 def _flipped(content: bytes, rng: random.Random) -> bytes:
@@ -112,7 +179,7 @@ def _flipped(content: bytes, rng: random.Random) -> bytes:
 
 
 def _truncated(content: bytes, rng: random.Random) -> bytes:
-    return content[:_place(content, rng)]
+    return content[: _place(content, rng)]
 
 
 def _lines(content: bytes, rng: random.Random) -> bytes:
@@ -159,6 +226,7 @@ def outcome(file: Path, render: bool) -> str:
         scene = load(file.with_suffix(".obj") if file.suffix == ".mtl" else file)
         if render:
             from clrt.rendering.renderer import Renderer
+
             list(Renderer(scene, size=(16, 16), spp=1).passes(spp=1))
         return "picture"
     except SceneError as error:
@@ -196,17 +264,34 @@ def work(folder: Path, first: int, last: int, render: int) -> None:
         print(told, flush=True)
 
 
-def run(count: int, folder: Path, render: int = 0, told: Callable[[str], None] = lambda line: None,
-        ) -> dict[str, Counter[str]]:
+def run(
+    count: int,
+    folder: Path,
+    render: int = 0,
+    told: Callable[[str], None] = lambda line: None,
+) -> dict[str, Counter[str]]:
     """Return the outcomes of files 0 … count − 1 by format, with the seeds in folder/seeds; pass bad ones to `told`."""
     seeds = seeds_in(folder / "seeds")
     results: dict[str, Counter[str]] = {}
     first = 0
     while first < count:
-        command = [sys.executable, "-m", "tests.fuzz", str(count), "--work", str(folder), str(first),
-                   "--render", str(render)]
-        with (folder / "log").open("w+b") as log, subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=log, text=True, cwd=Path(__file__).parents[1]) as process:
+        command = [
+            sys.executable,
+            "-m",
+            "tests.fuzz",
+            str(count),
+            "--work",
+            str(folder),
+            str(first),
+            "--render",
+            str(render),
+        ]
+        with (
+            (folder / "log").open("w+b") as log,
+            subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=log, text=True, cwd=Path(__file__).parents[1]
+            ) as process,
+        ):
             assert process.stdout is not None
             for line in process.stdout:
                 number, _, what = line.strip().partition(" ")

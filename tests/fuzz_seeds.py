@@ -88,14 +88,23 @@ map_Kd -s 2 2 2 wood.png
 def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
     """Write a few seeds of each format to `folder`, and the small files found in the folders `more`."""
     folder.mkdir(parents=True)
-    for name, write in {"a.obj": obj, "n.obj": obj_with_normals, "a.ply": ply_ascii, "b.ply": ply_binary,
-                        "c.ply": ply_big_endian, "n.ply": ply_with_normals, "a.stl": stl_ascii, "b.stl": stl_binary,
-                        "a.off": off}.items():
+    for name, write in {
+        "a.obj": obj,
+        "n.obj": obj_with_normals,
+        "a.ply": ply_ascii,
+        "b.ply": ply_binary,
+        "c.ply": ply_big_endian,
+        "n.ply": ply_with_normals,
+        "a.stl": stl_ascii,
+        "b.stl": stl_binary,
+        "a.off": off,
+    }.items():
         write(folder / name)
     (folder / "quads.ply").write_text(
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
         "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
-        "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n3 0 1 2\n")
+        "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n3 0 1 2\n"
+    )
     (folder / "a.mtl").write_text(MTL)
     (folder / "b.obj").write_text(OBJ.replace("damaged", "a"))
     (folder / "a.toml").write_text(SCENE)
@@ -105,8 +114,13 @@ def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
         write_image(folder / name, pixels)
     for name in ("wood.png", "wood.jpg"):
         imageio.imwrite(folder / name, (pixels * 255).astype(np.uint8))
-    for name, document in {"a.glb": ball(), "b.gltf": ball(), "cameras.gltf": cameras(), "draco.glb": compressed(),
-                           "textured.glb": textured((folder / "wood.jpg").read_bytes())}.items():
+    for name, document in {
+        "a.glb": ball(),
+        "b.gltf": ball(),
+        "cameras.gltf": cameras(),
+        "draco.glb": compressed(),
+        "textured.glb": textured((folder / "wood.jpg").read_bytes()),
+    }.items():
         document.write(folder / name)
     for place in more:
         for file in sorted(place.rglob("*")):
@@ -123,17 +137,29 @@ def textured(picture: bytes) -> Gltf:
     rows = np.zeros(len(vertices), [("position", "<i2", 4), ("uv", "<u2", 2)])
     rows["position"][:, :3], rows["uv"] = vertices * 32767, vertices[:, :2] * 30000 + 32000
     view = gltf.view(rows.tobytes(), byteStride=rows.itemsize)
-    sparse = {"count": 2, "indices": {"bufferView": gltf.view(bytes([2, 5])), "componentType": 5121},
-              "values": {"bufferView": gltf.view(np.array([[7, 8, 9], [4, 5, 6]], "<i2").tobytes())}}
+    sparse = {
+        "count": 2,
+        "indices": {"bufferView": gltf.view(bytes([2, 5])), "componentType": 5121},
+        "values": {"bufferView": gltf.view(np.array([[7, 8, 9], [4, 5, 6]], "<i2").tobytes())},
+    }
     position = gltf.accessor(vertices, "<i2", view, normalized=True, sparse=sparse)
     uv = gltf.accessor(vertices[:, :2], "<u2", view, byteOffset=8, normalized=True)
-    gltf.document |= {"images": [{"bufferView": gltf.view(picture), "mimeType": "image/jpeg"}],
-                      "textures": [{"source": 0, "sampler": 0}], "samplers": [{"wrapS": 33071}],
-                      "materials": [{"name": "wood", "pbrMetallicRoughness": {
-                          "baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}},
-                          "normalTexture": {"index": 0}, "alphaMode": "MASK"}],
-                      "extensionsUsed": ["KHR_mesh_quantization"]}
-    gltf.mesh(attributes={"POSITION": position, "TEXCOORD_0": uv}, material=0,
-              indices=gltf.accessor(faces.ravel(), "<u1"))
+    gltf.document |= {
+        "images": [{"bufferView": gltf.view(picture), "mimeType": "image/jpeg"}],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"wrapS": 33071}],
+        "materials": [
+            {
+                "name": "wood",
+                "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}},
+                "normalTexture": {"index": 0},
+                "alphaMode": "MASK",
+            }
+        ],
+        "extensionsUsed": ["KHR_mesh_quantization"],
+    }
+    gltf.mesh(
+        attributes={"POSITION": position, "TEXCOORD_0": uv}, material=0, indices=gltf.accessor(faces.ravel(), "<u1")
+    )
     gltf.node(mesh=0, matrix=(np.diag([2.0, -1, 3, 1])).ravel().tolist())
     return gltf

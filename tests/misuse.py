@@ -31,7 +31,7 @@ import clrt
 from clrt.errors import ClrtError, UsageError
 
 CALLS = 30
-SECONDS = 240     # after which a sequence counts as hung
+SECONDS = 240  # after which a sequence counts as hung
 SCENE = Path(__file__).parents[1] / "scenes" / "cornell.toml"
 SIZE, SPP = (24, 16), 4
 LAYOUTS = ("bvh8", "bvh2", "cwbvh", "packs", "list", None)
@@ -58,10 +58,25 @@ class Sequence:
         self.armed = False
         signal.signal(signal.SIGALRM, self._on_alarm)
         self.calls: list[Callable[[], None]] = [
-            self.ask, self.ask_interrupted, self.ask_from_threads, self.ask_wrongly, self.refit, self.build,
-            self.copy_query, self.fork, self.instances, self.render, self.leave_early, self.render_interrupted,
-            self.drop_generators, self.render_from_threads, self.render_wrongly, self.move_camera, self.copy_scene,
-            self.collect]
+            self.ask,
+            self.ask_interrupted,
+            self.ask_from_threads,
+            self.ask_wrongly,
+            self.refit,
+            self.build,
+            self.copy_query,
+            self.fork,
+            self.instances,
+            self.render,
+            self.leave_early,
+            self.render_interrupted,
+            self.drop_generators,
+            self.render_from_threads,
+            self.render_wrongly,
+            self.move_camera,
+            self.copy_scene,
+            self.collect,
+        ]
 
     def run(self) -> None:
         for _ in range(CALLS):
@@ -80,8 +95,10 @@ class Sequence:
 
     def ask(self) -> None:
         """Compare hits with the initial ones; t may be rounded differently after a refit there and back."""
-        for found, expected in ((self.query.closest_hit(*self.rays), self.hits),
-                                (self.query.all_hits(*self.rays)[1], self.all_hits)):
+        for found, expected in (
+            (self.query.closest_hit(*self.rays), self.hits),
+            (self.query.all_hits(*self.rays)[1], self.all_hits),
+        ):
             assert (found["primitive"] == expected["primitive"]).mean() > 0.999
             both = (found["primitive"] >= 0) & (expected["primitive"] >= 0)
             assert np.median(abs(found["t"][both] - expected["t"][both])) < 1e-6
@@ -90,8 +107,9 @@ class Sequence:
         """A kernel left running after an interrupt would overwrite freed memory, where the guard arrays now lie."""
         origins, directions = np.tile(self.rays[0], (60, 1)), np.tile(self.rays[1], (60, 1))
         for _ in range(3):
-            self._interrupt(0.1, self._any((self.query.closest_hit, self.query.any_hit, self.query.all_hits)),
-                            origins, directions)
+            self._interrupt(
+                0.1, self._any((self.query.closest_hit, self.query.any_hit, self.query.all_hits)), origins, directions
+            )
         guards = [np.full((5000, 4), 7.0) for _ in range(50)]
         time.sleep(0.05)
         assert all((guard == 7.0).all() for guard in guards)
@@ -102,8 +120,9 @@ class Sequence:
     def ask_wrongly(self) -> None:
         for _ in range(8):
             one, other = self._any(WRONG), self._any((*WRONG, self.rays[0]))
-            call = self._any((self.query.closest_hit, self.query.any_hit, self.query.all_hits, clrt.RayQuery,
-                              self.query.refit))
+            call = self._any(
+                (self.query.closest_hit, self.query.any_hit, self.query.all_hits, clrt.RayQuery, self.query.refit)
+            )
             with suppress(ClrtError):
                 call(one) if call == self.query.refit else call(one, other)
 
@@ -120,7 +139,7 @@ class Sequence:
         layout, builder = self._any(LAYOUTS), self._any(("sah", "midpoint", "ploc", "reinsertion", None))
 
         def keep() -> None:
-            with suppress(UsageError):      # not every builder supports every layout
+            with suppress(UsageError):  # not every builder supports every layout
                 self.kept.append(clrt.RayQuery(self.vertices, self.faces, layout=layout, builder=builder))
 
         self._interrupt(0.3, keep)
@@ -132,7 +151,7 @@ class Sequence:
     def fork(self) -> None:
         """In the child process every query and render must raise ClrtError; the parent continues to work."""
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)     # other threads may be running
+            warnings.simplefilter("ignore", DeprecationWarning)  # other threads may be running
             child = os.fork()
         if child == 0:
             refused = 0
@@ -189,8 +208,22 @@ class Sequence:
 
     def render_wrongly(self) -> None:
         for _ in range(6):
-            name = self._any(("spp", "size", "max_depth", "seed", "integrator", "sampler", "filter", "layout", "aovs",
-                              "clamp_direct", "device", "error_percentile"))
+            name = self._any(
+                (
+                    "spp",
+                    "size",
+                    "max_depth",
+                    "seed",
+                    "integrator",
+                    "sampler",
+                    "filter",
+                    "layout",
+                    "aovs",
+                    "clamp_direct",
+                    "device",
+                    "error_percentile",
+                )
+            )
             with suppress(ClrtError):
                 clrt.render(self.scene, **{"spp": 1, "size": (8, 8), name: self._any(WRONG)})
             with suppress(ClrtError):

@@ -24,8 +24,10 @@ from clrt.scene.geometry import instancing
 from .small_work import work
 
 #: Execution settings by device type, which override those of the device.
-DEVICES: dict[str, dict[str, Any]] = {"cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8"},
-                                      "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh", "fuses": False}}
+DEVICES: dict[str, dict[str, Any]] = {
+    "cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8"},
+    "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh", "fuses": False},
+}
 #: Block sizes so small that even this work gives several work-items a block each.
 SHARES = {"SMALLEST_BLOCK": {"cpu": 4, "gpu": 4}, "SCAN_ITEMS": 4, "SCAN_PART": 256}
 ENQUEUE_COPY = cl.enqueue_copy
@@ -55,7 +57,7 @@ def copy_whole(queue: cl.CommandQueue, to: Any, source: Any, **options: Any) -> 
         ENQUEUE_COPY(queue, part, source)
     else:
         part = np.frombuffer(source, np.uint8)
-    whole[first:first + part.size] = part
+    whole[first : first + part.size] = part
     return ENQUEUE_COPY(queue, to, whole)
 
 
@@ -66,18 +68,29 @@ def at_once(where: str, work: Callable[[], Any]) -> Any:
 
 def compiled_files() -> list[str]:
     """Return the kernel files of all programs that this process has built."""
-    return sorted({file for shared in contexts._shared.values() for built in shared.programs.values()
-                   for file in program.files_of(built.source)})
+    return sorted(
+        {
+            file
+            for shared in contexts._shared.values()
+            for built in shared.programs.values()
+            for file in program.files_of(built.source)
+        }
+    )
 
 
 def main(form: str, path: str) -> None:
     """Run the small work with the settings DEVICES[form]; write the answers to `path`, an .npz file."""
     workarounds = {"Buffer": KeptBuffer, "enqueue_copy": copy_whole}
-    instancing.FEW_TRIANGLES = 0   # instance small meshes, too
-    contexts.MOST_COMPILED = program.MOST_KEPT = sys.maxsize    # see compiled_files
+    instancing.FEW_TRIANGLES = 0  # instance small meshes, too
+    contexts.MOST_COMPILED = program.MOST_KEPT = sys.maxsize  # see compiled_files
     alone = {"in_background": at_once}
-    for owner, values in ((Device, DEVICES[form]), (data_parallel, SHARES), (cl, workarounds), (program, alone),
-                          (scene_on_device, alone)):
+    for owner, values in (
+        (Device, DEVICES[form]),
+        (data_parallel, SHARES),
+        (cl, workarounds),
+        (program, alone),
+        (scene_on_device, alone),
+    ):
         for name, value in values.items():
             setattr(owner, name, value)
     answers = {f"{way}/{name}": array for way, found in work(open_device("oclgrind")) for name, array in found.items()}

@@ -40,22 +40,25 @@ import pyopencl.array  # noqa: F401
 LACKS: dict[str, dict[Any, str]] = {
     "win32": {
         os: "chown fchmod fork forkpty getegid geteuid getgid getuid killpg mkfifo mknod nice O_DIRECT posix_fadvise "
-            "pread pwrite register_at_fork sched_getaffinity sched_setaffinity setsid statvfs uname",
+        "pread pwrite register_at_fork sched_getaffinity sched_setaffinity setsid statvfs uname",
         signal: "SIGALRM SIGBUS SIGCHLD SIGCONT SIGHUP SIGPIPE SIGQUIT SIGSTOP SIGTSTP SIGUSR1 SIGUSR2 SIG_BLOCK "
-                "SIG_SETMASK SIG_UNBLOCK alarm pthread_kill pthread_sigmask setitimer sigtimedwait sigwait",
-        mmap: "MADV_HUGEPAGE"},
+        "SIG_SETMASK SIG_UNBLOCK alarm pthread_kill pthread_sigmask setitimer sigtimedwait sigwait",
+        mmap: "MADV_HUGEPAGE",
+    },
     "darwin": {
         os: "O_DIRECT O_LARGEFILE O_NOATIME O_PATH O_RSYNC copy_file_range eventfd fdatasync getrandom getresgid "
-            "getresuid memfd_create pidfd_open pipe2 posix_fadvise posix_fallocate sched_getaffinity sched_getparam "
-            "sched_getscheduler sched_setaffinity sched_setparam sched_setscheduler setresgid setresuid splice waitid",
+        "getresuid memfd_create pidfd_open pipe2 posix_fadvise posix_fallocate sched_getaffinity sched_getparam "
+        "sched_getscheduler sched_setaffinity sched_setparam sched_setscheduler setresgid setresuid splice waitid",
         signal: "SIGCLD SIGPOLL SIGPWR SIGRTMAX SIGRTMIN SIGSTKFLT sigtimedwait sigwaitinfo",
         mmap: "MADV_DODUMP MADV_DOFORK MADV_DONTDUMP MADV_DONTFORK MADV_HUGEPAGE MADV_HWPOISON MADV_MERGEABLE "
-              "MADV_NOHUGEPAGE MADV_REMOVE MADV_UNMERGEABLE MAP_DENYWRITE MAP_EXECUTABLE MAP_POPULATE",
+        "MADV_NOHUGEPAGE MADV_REMOVE MADV_UNMERGEABLE MAP_DENYWRITE MAP_EXECUTABLE MAP_POPULATE",
         fcntl: "F_ADD_SEALS F_GETLEASE F_GETPIPE_SZ F_GET_SEALS F_NOTIFY F_OFD_GETLK F_OFD_SETLK F_OFD_SETLKW "
-               "F_SETLEASE F_SETPIPE_SZ",
+        "F_SETLEASE F_SETPIPE_SZ",
         resource: "RLIMIT_MSGQUEUE RLIMIT_NICE RLIMIT_OFILE RLIMIT_RTPRIO RLIMIT_RTTIME RLIMIT_SIGPENDING "
-                  "RUSAGE_THREAD prlimit",
-        time: "CLOCK_BOOTTIME CLOCK_TAI pthread_getcpuclockid"}}
+        "RUSAGE_THREAD prlimit",
+        time: "CLOCK_BOOTTIME CLOCK_TAI pthread_getcpuclockid",
+    },
+}
 MODULES = {"win32": ("fcntl", "grp", "pwd", "resource", "termios"), "darwin": ("spwd",)}
 #: Functions that the C library lacks.
 C_LACKS = {"win32": "", "darwin": "mallopt malloc_trim prctl sched_getaffinity"}
@@ -64,15 +67,15 @@ C_LACKS = {"win32": "", "darwin": "mallopt malloc_trim prctl sched_getaffinity"}
 def become(system: str) -> None:
     """Remove what the system lacks; on Windows, add SIGBREAK as SIGUSR2."""
     if system == "win32":
-        setattr(signal, "SIGBREAK", signal.SIGUSR2)     # exists on Windows only
+        setattr(signal, "SIGBREAK", signal.SIGUSR2)  # exists on Windows only
     for module, names in LACKS[system].items():
         for name in names.split():
             if hasattr(module, name):
                 delattr(module, name)
     for name in MODULES[system]:
-        sys.modules[name] = None    # type: ignore[assignment]
+        sys.modules[name] = None  # type: ignore[assignment]
     _Library.lacks, _Library.nameless = set(C_LACKS[system].split()), system == "darwin"
-    ctypes.CDLL = _Library    # type: ignore[misc]
+    ctypes.CDLL = _Library  # type: ignore[misc]
     if system == "darwin":
         _forget_proc()
         multiprocessing.set_start_method("spawn")
@@ -98,6 +101,7 @@ class _Library(ctypes.CDLL):
 
 def _forget_proc() -> None:
     """Make all accesses to /proc raise FileNotFoundError."""
+
     def check(path: object) -> None:
         if isinstance(path, str | bytes | os.PathLike) and os.fsdecode(path).startswith("/proc"):
             raise FileNotFoundError(2, "No such file or directory", path)

@@ -36,16 +36,28 @@ def load_reference(json_path: Path) -> tuple[Scene, NDArray[np.float32]]:
     if view["width"] != view["height"]:
         raise ValueError(f"{json_path}: the camera's fov is defined for square pictures only")
     scene = Scene(
-        meshes=[mesh for shape in record["shapes"] if shape["type"] == "mesh"
-                for mesh in _meshes(folder, shape, record["materials"])],
+        meshes=[
+            mesh
+            for shape in record["shapes"]
+            if shape["type"] == "mesh"
+            for mesh in _meshes(folder, shape, record["materials"])
+        ],
         spheres=[_sphere(shape, record["materials"]) for shape in record["shapes"] if shape["type"] == "sphere"],
-        lights=[PointLight(position=_triple(light["position"]), intensity=_triple(light["intensity"]))
-                for light in record["lights"] if light["type"] == "point"],
-        camera=Camera(position=_triple(view["origin"]), look_at=_triple(view["target"]), up=_triple(view["up"]),
-                      fov_degrees=view["fov"]),
+        lights=[
+            PointLight(position=_triple(light["position"]), intensity=_triple(light["intensity"]))
+            for light in record["lights"]
+            if light["type"] == "point"
+        ],
+        camera=Camera(
+            position=_triple(view["origin"]),
+            look_at=_triple(view["target"]),
+            up=_triple(view["up"]),
+            fov_degrees=view["fov"],
+        ),
         environment=_environment(folder, record["lights"]),
         render=RenderSettings(size=(view["width"], view["height"]), max_depth=record["max_depth"]),
-        name=record["name"])
+        name=record["name"],
+    )
     return scene, read_picture(json_path.with_suffix(".exr"))
 
 
@@ -85,8 +97,9 @@ def _ggx(record: Record) -> Material:
 
 MAKERS: dict[str, Callable[[Record], Material]] = {
     "diffuse": lambda record: Diffuse(color=_triple(record["color"])),
-    "metal": lambda record: MetallicRoughness(color=_triple(record["color"]), metallic=1.0,
-                                              roughness=record["roughness"], smith="separable"),
+    "metal": lambda record: MetallicRoughness(
+        color=_triple(record["color"]), metallic=1.0, roughness=record["roughness"], smith="separable"
+    ),
     "ggx": _ggx,
     "mirror": lambda record: Mirror(color=_triple(record["color"])),
     "glass": lambda record: Dielectric(ior=record["ior"]),
@@ -111,8 +124,11 @@ def main(folder: Path, spp: int) -> None:
         image = clrt.render(scene, spp=spp)
         result = clrt.compare(image.pixels, expected)
         ratios = "".join(f"{(ratio - 1) * 1e5:9.1f}" for ratio in result["mean_ratio"])
-        print(f"{path.stem:16} {result['relmse']:10.3g} {image.report['noise'] ** 2:10.3g}  {ratios}  "
-              f"{image.report['seconds']:6.1f}", flush=True)
+        print(
+            f"{path.stem:16} {result['relmse']:10.3g} {image.report['noise'] ** 2:10.3g}  {ratios}  "
+            f"{image.report['seconds']:6.1f}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

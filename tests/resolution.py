@@ -15,8 +15,12 @@ from configparser import ConfigParser
 from itertools import product
 from pathlib import Path
 
-PLATFORMS = {"Linux x86-64": "x86_64-manylinux_2_35", "Linux ARM64": "aarch64-manylinux_2_35",
-             "Windows x86-64": "x86_64-pc-windows-msvc", "macOS ARM64": "aarch64-apple-darwin"}
+PLATFORMS = {
+    "Linux x86-64": "x86_64-manylinux_2_35",
+    "Linux ARM64": "aarch64-manylinux_2_35",
+    "Windows x86-64": "x86_64-pc-windows-msvc",
+    "macOS ARM64": "aarch64-apple-darwin",
+}
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 #: Imgui Bundle's wheels are for macOS 14 and later.
 MACOS = {"MACOSX_DEPLOYMENT_TARGET": "14.0"}
@@ -34,8 +38,13 @@ def requirements() -> dict[str, list[str]]:
 def fault(needed: list[str], platform: str, python: str) -> str:
     """Return why wheels alone cannot satisfy the requirements, or "" if they can."""
     options = ["--only-binary", ":all:", "--no-config", "--python-platform", platform, "--python-version", python]
-    done = subprocess.run([sys.executable, "-m", "uv", "pip", "compile", "-", "--quiet", *options],
-                          input="\n".join(needed), capture_output=True, text=True, env=os.environ | MACOS)
+    done = subprocess.run(
+        [sys.executable, "-m", "uv", "pip", "compile", "-", "--quiet", *options],
+        input="\n".join(needed),
+        capture_output=True,
+        text=True,
+        env=os.environ | MACOS,
+    )
     return done.stderr.strip() or "failed" if done.returncode else ""
 
 
@@ -53,8 +62,13 @@ def main() -> int:
         found = dict(zip(places, pool.map(lambda place: faults_at(*place), places)))
     print(f"{'':16}", *(f"{platform:>20}" for platform in PLATFORMS))
     for name in requirements():
-        print(f"{name:16}", *(f"{' '.join('no' if found[platform, python][name] else python for python in PYTHONS):>20}"
-                              for platform in PLATFORMS))
+        print(
+            f"{name:16}",
+            *(
+                f"{' '.join('no' if found[platform, python][name] else python for python in PYTHONS):>20}"
+                for platform in PLATFORMS
+            ),
+        )
     wrong = [(name, *place, why) for place, faults in found.items() for name, why in faults.items() if why]
     for name, platform, python, why in wrong:
         print(f"\n{name} on {platform}, Python {python}:\n{why}")

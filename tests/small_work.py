@@ -46,8 +46,11 @@ Answers = dict[str, NDArray[Any]]
 def scene() -> Scene:
     """Return a scene with all kinds of primitives, materials and lights, and few triangles."""
     full, (vertices, faces) = everything(), icosphere(0)
-    smooth = [Mesh((mesh.vertices.mean(axis=0) + vertices).astype(np.float32), faces, mesh.material, normals=vertices)
-              for mesh in full.meshes if mesh.normals is not None]
+    smooth = [
+        Mesh((mesh.vertices.mean(axis=0) + vertices).astype(np.float32), faces, mesh.material, normals=vertices)
+        for mesh in full.meshes
+        if mesh.normals is not None
+    ]
     return replace(full, meshes=[*(mesh for mesh in full.meshes if mesh.normals is None), *smooth], render=SETTINGS)
 
 
@@ -72,23 +75,37 @@ def film(session: SingleDeviceAccumulation, spp: int) -> Film:
 def hits(query: clrt.RayQuery | clrt.InstancedRayQuery) -> Answers:
     """Return the closest hits, the first two hits, and whether anything is hit within t = 0.7, per ray."""
     closest, (ray, several) = query.closest_hit(ORIGINS, DIRECTIONS), query.all_hits(ORIGINS, DIRECTIONS, max_hits=2)
-    return {"t": closest["t"], "primitive": closest["primitive"], "blocked": query.any_hit(ORIGINS, DIRECTIONS, 0.7),
-            "ray": ray, "several": several["primitive"]}
+    return {
+        "t": closest["t"],
+        "primitive": closest["primitive"],
+        "blocked": query.any_hit(ORIGINS, DIRECTIONS, 0.7),
+        "ray": ray,
+        "several": several["primitive"],
+    }
 
 
 def mesh_hits(device: Device, layout: str, traversal: str) -> Answers:
     """Intersect a mesh with a BVH that was built over other triangles and refitted."""
-    query = clrt.RayQuery(TRIANGLES[::-1].reshape(-1, 3), FACES, device=device.info.index, layout=layout,
-                          builder="sah", traversal=traversal)
+    query = clrt.RayQuery(
+        TRIANGLES[::-1].reshape(-1, 3),
+        FACES,
+        device=device.info.index,
+        layout=layout,
+        builder="sah",
+        traversal=traversal,
+    )
     query.refit(TRIANGLES.reshape(-1, 3))
     return hits(query)
 
 
 def instance_hits(device: Device, layout: str, traversal: str) -> Answers:
     """Intersect five instances of two meshes."""
-    meshes = [(TRIANGLES[part].reshape(-1, 3), FACES[:len(TRIANGLES[part])]) for part in (slice(0, 40), slice(40, 60))]
-    return hits(clrt.InstancedRayQuery(meshes, [0, 1, 1, 0, 1], TO_WORLD, device=device.info.index, layout=layout,
-                                       traversal=traversal))
+    meshes = [(TRIANGLES[part].reshape(-1, 3), FACES[: len(TRIANGLES[part])]) for part in (slice(0, 40), slice(40, 60))]
+    return hits(
+        clrt.InstancedRayQuery(
+            meshes, [0, 1, 1, 0, 1], TO_WORLD, device=device.info.index, layout=layout, traversal=traversal
+        )
+    )
 
 
 def variants() -> Iterator[tuple[RenderSettings, dict[str, Any]]]:

@@ -48,15 +48,21 @@ def main() -> int:
     parser.add_argument("--device")
     given = parser.parse_args()
     scene = clrt.load(given.scene)
-    scene = replace(scene, render=replace(scene.render, size=SIZE, spp=64),
-                    spheres=scene.spheres or [Sphere(radius=0.2)],
-                    environment=replace(scene.environment, color=(0.1, 0.1, 0.1)), lights=scene.lights or [LAMP])
+    scene = replace(
+        scene,
+        render=replace(scene.render, size=SIZE, spp=64),
+        spheres=scene.spheres or [Sphere(radius=0.2)],
+        environment=replace(scene.environment, color=(0.1, 0.1, 0.1)),
+        lights=scene.lights or [LAMP],
+    )
     with Live(scene, device=given.device) as live:
         soak = Soak(live, random.Random(given.seed))
         memory = soak.run(60 * given.minutes)
     print(f"{soak.edits} edits, {dict(soak.kinds)}")
-    print(f"{soak.pictures} pictures, {soak.programs} changes of program; seconds from edit to picture: "
-          f"median {np.median(soak.latencies):.3f}, 99 % {np.percentile(soak.latencies, 99):.3f}")
+    print(
+        f"{soak.pictures} pictures, {soak.programs} changes of program; seconds from edit to picture: "
+        f"median {np.median(soak.latencies):.3f}, 99 % {np.percentile(soak.latencies, 99):.3f}"
+    )
     # Caches fill in the first third; growth after it is a leak.
     settled, last = (np.median(np.array(part), axis=0) for part in np.array_split(memory, 3)[1:])
     for name, before, after in zip(("process", "process in use", "device"), settled, last):
@@ -76,8 +82,20 @@ class Soak:
         self.latencies: list[float] = []
         self.edits = self.programs = self.pictures = 0
         self._edits: list[Callable[[], None]] = [
-            self.walk, self.material, self.preset, self.move_sphere, self.add_sphere, self.remove_sphere,
-            self.light, self.sky, self.integrator, self.settings, self.undo, self.redo, self.mistake]
+            self.walk,
+            self.material,
+            self.preset,
+            self.move_sphere,
+            self.add_sphere,
+            self.remove_sphere,
+            self.light,
+            self.sky,
+            self.integrator,
+            self.settings,
+            self.undo,
+            self.redo,
+            self.mistake,
+        ]
 
     def run(self, seconds: float) -> list[tuple[int, int, int]]:
         """Edit for `seconds`; return process memory, heap memory in use and device memory after each edit."""
@@ -100,8 +118,11 @@ class Soak:
             memory.append((process_memory(), memory_in_use(), device_memory()))
             if time.monotonic() > told + 30:
                 told, seen = time.monotonic(), self.live.snapshot()
-                print(f"{end - told:6.0f} s to go, {self.edits} edits, {memory[-1][0] / 2**20:.1f} MiB, "
-                      f"programs {seen.programs}", flush=True)
+                print(
+                    f"{end - told:6.0f} s to go, {self.edits} edits, {memory[-1][0] / 2**20:.1f} MiB, "
+                    f"programs {seen.programs}",
+                    flush=True,
+                )
         self.programs, self.pictures = self.live.snapshot().programs, self.live.snapshot().number
         return memory
 
@@ -123,8 +144,14 @@ class Soak:
     def preset(self) -> None:
         """Change the material type or preset of the first sphere."""
         substance = self.random.choice(get_args(Preset))
-        new = self.random.choice([Diffuse(), Mirror(), Dielectric(ior=self.random.uniform(1.1, 2)),
-                                  MetallicRoughness(preset=substance, roughness=self.random.random())])
+        new = self.random.choice(
+            [
+                Diffuse(),
+                Mirror(),
+                Dielectric(ior=self.random.uniform(1.1, 2)),
+                MetallicRoughness(preset=substance, roughness=self.random.random()),
+            ]
+        )
         first, *others = self.live.scene.spheres
         self._edit(replace(self.live.scene, spheres=[replace(first, material=new), *others]))
 
@@ -155,8 +182,12 @@ class Soak:
 
     def sky(self) -> None:
         """Change the strength, rotation and color of the environment."""
-        sky = replace(self.live.scene.environment, strength=self.random.uniform(0.1, 2), color=self._color(1),
-                      rotation_degrees=self.random.uniform(0, 360))
+        sky = replace(
+            self.live.scene.environment,
+            strength=self.random.uniform(0.1, 2),
+            color=self._color(1),
+            rotation_degrees=self.random.uniform(0, 360),
+        )
         self._edit(replace(self.live.scene, environment=sky))
 
     def integrator(self) -> None:
@@ -168,8 +199,14 @@ class Soak:
 
     def settings(self) -> None:
         """Change the BVH use, image scale and samples per frame."""
-        self.live.choose(replace(self.live.settings, tree=self.random.choice((None, True)),
-                                 scale=self.random.choice((1.0, 0.5)), samples=self.random.choice((1, 2))))
+        self.live.choose(
+            replace(
+                self.live.settings,
+                tree=self.random.choice((None, True)),
+                scale=self.random.choice((1.0, 0.5)),
+                samples=self.random.choice((1, 2)),
+            )
+        )
 
     def undo(self) -> None:
         """Undo the last step."""
@@ -209,8 +246,21 @@ def process_memory() -> int:
 class Mallinfo(ctypes.Structure):
     """struct mallinfo2, mallinfo(3)."""
 
-    _fields_ = [(name, ctypes.c_size_t) for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks",
-                                                     "fsmblks", "uordblks", "fordblks", "keepcost")]
+    _fields_ = [
+        (name, ctypes.c_size_t)
+        for name in (
+            "arena",
+            "ordblks",
+            "smblks",
+            "hblks",
+            "hblkhd",
+            "usmblks",
+            "fsmblks",
+            "uordblks",
+            "fordblks",
+            "keepcost",
+        )
+    ]
 
 
 def memory_in_use() -> int:

@@ -42,7 +42,11 @@ def test_the_steps_make_a_light(tmp_path: Path) -> None:
     above, listed, below = file.read_text(encoding="utf-8").partition("#: Every type of light.\nLight = ")
     file.write_text(f"{above}{piece(text, 'python')}\n\n{listed}DiskLight | {below}", "utf-8")
     (tmp_path / "disk.toml").write_text(piece(text, "toml"), "utf-8")
-    done = subprocess.run([sys.executable, "-P", "-c", PROGRAM, tmp_path / "disk.toml"], capture_output=True, text=True,
-                          env={**os.environ, "PYTHONPATH": str(tmp_path)})
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", PROGRAM, tmp_path / "disk.toml"],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == pytest.approx(10 * 0.5**2 / (0.5**2 + 4**2), rel=1e-4)

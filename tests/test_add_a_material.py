@@ -35,7 +35,7 @@ def reflected(cosine: float) -> float:
     """Return the integral of f·cos over the hemisphere by the midpoint rule: radiance towards a view at this cosine."""
     a = 1 / (np.pi + (np.pi / 2 - 2 / 3) * ROUGHNESS)
     steps = 1000
-    z = np.sqrt((np.arange(steps) + 0.5) / steps)[:, None]      # equal steps of z² are equal projected solid angles
+    z = np.sqrt((np.arange(steps) + 0.5) / steps)[:, None]  # equal steps of z² are equal projected solid angles
     phi = (np.arange(steps) + 0.5) / steps * 2 * np.pi
     s = np.sqrt(1 - z**2) * np.sqrt(1 - cosine**2) * np.cos(phi)
     t = np.where(s > 0, np.maximum(z, cosine), 1)
@@ -52,8 +52,12 @@ def test_the_steps_make_a_material(tmp_path: Path) -> None:
     file = tmp_path / "clrt/scene/materials/material_types.py"
     above, listed, below = file.read_text(encoding="utf-8").partition("MATERIALS: tuple[type[Material], ...] = (")
     file.write_text(f"{above}{re.sub('^   ', '', record, flags=re.MULTILINE)}\n\n{listed}OrenNayar, {below}", "utf-8")
-    done = subprocess.run([sys.executable, "-P", "-c", PROGRAM], capture_output=True, text=True,
-                          env={**os.environ, "PYTHONPATH": str(tmp_path)})
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", PROGRAM],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+    )
     assert done.returncode == 0, done.stderr
     expected = [reflected(np.cos(np.radians(degrees))) for degrees in (0, 75)]
     assert json.loads(f"[{','.join(done.stdout.split())}]") == pytest.approx(expected, rel=1e-3)

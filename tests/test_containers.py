@@ -15,8 +15,10 @@ FILES = sorted((HOUSE / "containers").glob("*.Containerfile"))
 def steps(path: Path) -> list[tuple[str, str]]:
     """Return instructions and their arguments, with continuation lines joined."""
     text = re.sub(r"\\\n", " ", path.read_text())
-    return [(word, rest) for word, _, rest in (line.partition(" ") for line in text.splitlines()
-                                               if line and not line.startswith("#"))]
+    return [
+        (word, rest)
+        for word, _, rest in (line.partition(" ") for line in text.splitlines() if line and not line.startswith("#"))
+    ]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -36,9 +38,14 @@ def test_what_is_installed_is_copied(path: Path) -> None:
     copied = {name for word, rest in steps(path) if word == "COPY" for name in rest.split()[:-1]}
     config = configparser.ConfigParser()
     config.read(HOUSE / "setup.cfg")
-    needs = {"setup.cfg", "pyproject.toml", config["metadata"]["license_files"],
-             config["metadata"]["long_description"].removeprefix("file:").strip(),
-             config["options"]["package_dir"].split("=")[1].strip(), "clrt"}
+    needs = {
+        "setup.cfg",
+        "pyproject.toml",
+        config["metadata"]["license_files"],
+        config["metadata"]["long_description"].removeprefix("file:").strip(),
+        config["options"]["package_dir"].split("=")[1].strip(),
+        "clrt",
+    }
     assert copied == needs
 
 

@@ -24,4 +24,10 @@ def test_all_values_and_pairs_are_covered(sizes: tuple[int, ...], strength: int)
 def test_the_others_are_marked() -> None:
     mark = covering("letter, digit", "ab", range(3)).mark
     assert [(*each.values, len(each.marks)) for each in mark.args[1]] == [
-        ("a", 0, 0), ("a", 1, 1), ("a", 2, 0), ("b", 0, 1), ("b", 1, 0), ("b", 2, 1)]
+        ("a", 0, 0),
+        ("a", 1, 1),
+        ("a", 2, 0),
+        ("b", 0, 1),
+        ("b", 1, 0),
+        ("b", 2, 1),
+    ]

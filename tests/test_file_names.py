@@ -58,15 +58,20 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "compare image": lambda image: clrt.compare(image, np.ones((8, 8, 3), np.float32)),
     "compare reference": lambda image: clrt.compare(np.ones((8, 8, 3), np.float32), image),
     "Image.save path": lambda new_png: clrt.Image(np.ones((8, 8, 3), np.float32)).save(new_png),
-    "Renderer checkpoint": lambda new_ck: list(clrt.Renderer(clrt.Scene(spheres=[clrt.Sphere()]), spp=1, size=(8, 8),
-                                                             checkpoint=new_ck).passes()),
+    "Renderer checkpoint": lambda new_ck: list(
+        clrt.Renderer(clrt.Scene(spheres=[clrt.Sphere()]), spp=1, size=(8, 8), checkpoint=new_ck).passes()
+    ),
     "save_scene path": lambda new_toml: save_scene(clrt.Scene(spheres=[clrt.Sphere()]), new_toml),
 }
 
 
 def test_each_parameter_with_a_file_name_is_called_below() -> None:
-    hints = {f"{name} {parameter}": str(hint) for name, function in public()
-             for parameter, hint in function.__annotations__.items() if parameter != "return"}
+    hints = {
+        f"{name} {parameter}": str(hint)
+        for name, function in public()
+        for parameter, hint in function.__annotations__.items()
+        if parameter != "return"
+    }
     assert [each for each, hint in hints.items() if re.search(r"\bPath\b", hint)] == []
     assert {each for each, hint in hints.items() if FILE_NAME.search(hint)} - {"Texture picture"} == set(CALLS)
 
@@ -77,7 +82,7 @@ def test_file_names_may_be_text_or_path_like(parameter: str, form: type, tmp_pat
     (tmp_path / "a.toml").write_text(SCENE + "[animation]\nturntable_seconds = 1\n")
     clrt.Image(np.ones((8, 8, 3), np.float32)).save(tmp_path / "a.exr")
     call = CALLS[parameter]
-    kind, = inspect.signature(call).parameters
+    (kind,) = inspect.signature(call).parameters
     name = {"scene": "a.toml", "image": "a.exr"}.get(kind, kind.replace("_", "."))
     file = tmp_path / name
     call(form(file))

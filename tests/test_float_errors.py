@@ -19,8 +19,13 @@ pytestmark = pytest.mark.statistics
 SCENES = Path(__file__).parents[1] / "scenes"
 SIZES = (1e-42, 1e-20, 1.0, 1e20, 1e36)
 OPTIONS: list[dict[str, Any]] = [
-    {}, {"adaptive": True}, {"integrator": "direct", "aovs": "albedo,normal,depth,position,direct,indirect,variance"},
-    {"integrator": "local"}, {"integrator": "depth"}, {"filter": "gaussian"}]
+    {},
+    {"adaptive": True},
+    {"integrator": "direct", "aovs": "albedo,normal,depth,position,direct,indirect,variance"},
+    {"integrator": "local"},
+    {"integrator": "depth"},
+    {"filter": "gaussian"},
+]
 
 
 def strictly(work: Callable[[], Any]) -> Any:
@@ -42,12 +47,16 @@ def test_queries(device: Device, size: float) -> None:
 
     def work() -> list[Any]:
         query = clrt.RayQuery(vertices, faces, device=device.info.index, spheres=spheres)
-        many = clrt.InstancedRayQuery([(vertices, faces)], [0, 0], np.stack([np.eye(3, 4), 2 * np.eye(3, 4)]),
-                                      device=device.info.index)
+        many = clrt.InstancedRayQuery(
+            [(vertices, faces)], [0, 0], np.stack([np.eye(3, 4), 2 * np.eye(3, 4)]), device=device.info.index
+        )
         found: list[Any] = []
         for each in (query, many, pickle.loads(pickle.dumps(query))):
-            found += [each.closest_hit(origins, directions, t_max), each.any_hit(origins, directions),
-                      *each.all_hits(origins, directions, t_max)]
+            found += [
+                each.closest_hit(origins, directions, t_max),
+                each.any_hit(origins, directions),
+                *each.all_hits(origins, directions, t_max),
+            ]
         query.refit(vertices[::-1])
         return [*found, query.closest_hit(origins, directions)]
 
@@ -59,6 +68,7 @@ def test_queries(device: Device, size: float) -> None:
 @pytest.mark.parametrize("name", ["spheres", "instances", "materials", "dragon"])
 def test_pictures(device: Device, tmp_path: Path, name: str, options: dict[str, Any]) -> None:
     """Load, render, save and compare scenes."""
+
     def work() -> Any:
         scene = clrt.load(SCENES / f"{name}.toml")
         image = clrt.render(scene, size=(24, 16), spp=4, device=device.info.index, **options)

@@ -13,13 +13,17 @@ import pytest
 
 HOUSE = Path(__file__).parents[1]
 #: Page → number of its blocks, and files that they write.
-PAGES = {"rays": (4, ()), "transparent-background": (1, ("product.png",)),
-         "dataset": (3, ("view_0003.exr", "view_0003.npz", "cameras.json"))}
+PAGES = {
+    "rays": (4, ()),
+    "transparent-background": (1, ("product.png",)),
+    "dataset": (3, ("view_0003.exr", "view_0003.npz", "cameras.json")),
+}
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_examples_print_what_they_say(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-                                      capsys: pytest.CaptureFixture[str]) -> None:
+def test_examples_print_what_they_say(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Blocks run in order and share variables; the comment after each print is its expected output."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scenes").symlink_to(HOUSE / "scenes")

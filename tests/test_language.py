@@ -86,39 +86,79 @@ def found(text: str, words: Mapping[str, str] = WORDS) -> list[str]:
 
 
 def test_prose_uses_the_words_of_the_field() -> None:
-    paths = [*HOUSE.glob("*.md"), *(HOUSE / "docs").rglob("*.md"), *(HOUSE / "scenes").glob("*.md"),
-             *(HOUSE / "clrt").rglob("*.py"), *(HOUSE / "kernels").rglob("*.cl")]
-    wrong = [f"{path.relative_to(HOUSE)}:{line}: write {better}" for path in sorted(paths)
-             for line, text in prose(path) for better in found(text)]
+    paths = [
+        *HOUSE.glob("*.md"),
+        *(HOUSE / "docs").rglob("*.md"),
+        *(HOUSE / "scenes").glob("*.md"),
+        *(HOUSE / "clrt").rglob("*.py"),
+        *(HOUSE / "kernels").rglob("*.cl"),
+    ]
+    wrong = [
+        f"{path.relative_to(HOUSE)}:{line}: write {better}"
+        for path in sorted(paths)
+        for line, text in prose(path)
+        for better in found(text)
+    ]
     assert not wrong, "\n".join(wrong)
 
 
 def test_messages_use_the_words_of_the_field() -> None:
-    wrong = [f"{path.relative_to(HOUSE)}:{line}: write {better}" for path in sorted((HOUSE / "clrt").rglob("*.py"))
-             for line, text in messages(path) for better in found(text, MESSAGE_WORDS)]
+    wrong = [
+        f"{path.relative_to(HOUSE)}:{line}: write {better}"
+        for path in sorted((HOUSE / "clrt").rglob("*.py"))
+        for line, text in messages(path)
+        for better in found(text, MESSAGE_WORDS)
+    ]
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("sentence", [
-    "16 samples a pixel", "rays a second", "a lamp that shines on both sides", "the round-about camera",
-    "lanes follow paths edge by edge", "the local illumination of old", "the noise that is told", "it begins anew"])
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        "16 samples a pixel",
+        "rays a second",
+        "a lamp that shines on both sides",
+        "the round-about camera",
+        "lanes follow paths edge by edge",
+        "the local illumination of old",
+        "the noise that is told",
+        "it begins anew",
+    ],
+)
 def test_old_sentences_are_found(sentence: str) -> None:
     assert found(sentence)
 
 
-@pytest.mark.parametrize("sentence", [
-    '"x" is no path of a scene; name a file', "the picture is black", "leave out --resume to begin anew",
-    "others do again what it was at, as it is told", "take another --device", "--resume goes on from a.ck",
-    "the same rays through clrt and other libraries, in turns", "a.ck: is there and is no checkpoint",
-    "Tree builder; default: sah", "Pictures beside it: layers of an .exr", "building the tree"])
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        '"x" is no path of a scene; name a file',
+        "the picture is black",
+        "leave out --resume to begin anew",
+        "others do again what it was at, as it is told",
+        "take another --device",
+        "--resume goes on from a.ck",
+        "the same rays through clrt and other libraries, in turns",
+        "a.ck: is there and is no checkpoint",
+        "Tree builder; default: sah",
+        "Pictures beside it: layers of an .exr",
+        "building the tree",
+    ],
+)
 def test_old_messages_are_found(sentence: str) -> None:
     assert found(sentence, MESSAGE_WORDS)
 
 
-@pytest.mark.parametrize("source", [
-    'raise SceneError(f"{path}: the file is cut short")', 'log.warning("%s goes on from there", path)',
-    'problems = [f"{x}: {y} is no texture"] if x else []', 'option("--tree", help="Which tree builder to use.")',
-    '@click.command()\ndef command():\n    """Begin a render, or go on."""'])
+@pytest.mark.parametrize(
+    "source",
+    [
+        'raise SceneError(f"{path}: the file is cut short")',
+        'log.warning("%s goes on from there", path)',
+        'problems = [f"{x}: {y} is no texture"] if x else []',
+        'option("--tree", help="Which tree builder to use.")',
+        '@click.command()\ndef command():\n    """Begin a render, or go on."""',
+    ],
+)
 def test_messages_are_found_in_sources(tmp_path: Path, source: str) -> None:
     (tmp_path / "a.py").write_text(source)
     assert [better for _, text in messages(tmp_path / "a.py") for better in found(text, MESSAGE_WORDS)]

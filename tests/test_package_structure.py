@@ -12,9 +12,34 @@ HOUSE = Path(__file__).parents[1]
 SOURCES = sorted((HOUSE / "clrt").rglob("*.py"))
 
 #: In order: a room imports only from itself and those before it. `clrt` itself is the public names alone.
-ROOMS = ["errors", "option_fields", "threads", "awake", "float_errors", "file_mode", "file_names", "aov_types", "scene",
-         "formats", "device", "accel", "queries", "trimesh", "rendering", "check", "output", "bench", "debug", "api",
-         "live", "window", "farm", "clrt", "cli", "__main__"]
+ROOMS = [
+    "errors",
+    "option_fields",
+    "threads",
+    "awake",
+    "float_errors",
+    "file_mode",
+    "file_names",
+    "aov_types",
+    "scene",
+    "formats",
+    "device",
+    "accel",
+    "queries",
+    "trimesh",
+    "rendering",
+    "check",
+    "output",
+    "bench",
+    "debug",
+    "api",
+    "live",
+    "window",
+    "farm",
+    "clrt",
+    "cli",
+    "__main__",
+]
 KNOW_OPENCL = {"device", "accel", "queries", "rendering"}
 #: Beyond the order: trees know nothing of scenes, and pictures are written without any device.
 NEVER = {"accel": {"scene"}, "output": {"device", "accel", "queries", "trimesh", "rendering"}}
@@ -39,7 +64,7 @@ def imported(path: Path) -> Iterator[str]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            above = package.split(".")[:len(package.split(".")) - node.level + 1] if node.level else []
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             base = ".".join(above + ([node.module] if node.module else []))
             yield from ([base] if node.module else [f"{base}.{alias.name}" for alias in node.names])
 
@@ -53,8 +78,12 @@ def may_import(own: str, module: str) -> bool:
 
 
 def test_rooms_are_entered_in_order_and_only_some_know_opencl() -> None:
-    assert not [f"{name(path)} imports {module}" for path in SOURCES for module in imported(path)
-                if not may_import(room(name(path)), module)]
+    assert not [
+        f"{name(path)} imports {module}"
+        for path in SOURCES
+        for module in imported(path)
+        if not may_import(room(name(path)), module)
+    ]
 
 
 def test_imports_that_are_wrong_are_found() -> None:
@@ -68,9 +97,11 @@ def test_every_room_is_in_the_list() -> None:
 
 def test_scenes_load_without_opencl(tmp_path: Path) -> None:
     """Both kinds of scene file are read and validated, and images written, if pyopencl cannot be imported."""
-    (tmp_path / "scene.toml").write_text('[materials.red]\ntype = "diffuse"\ncolor = [1, 0, 0]\n'
-                                         '[[mesh]]\nfile = "model.obj"\nmaterial = "red"\n'
-                                         '[[sphere]]\nmaterial = "red"\n')
+    (tmp_path / "scene.toml").write_text(
+        '[materials.red]\ntype = "diffuse"\ncolor = [1, 0, 0]\n'
+        '[[mesh]]\nfile = "model.obj"\nmaterial = "red"\n'
+        '[[sphere]]\nmaterial = "red"\n'
+    )
     (tmp_path / "model.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     program = f"""
 import sys

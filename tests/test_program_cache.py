@@ -19,6 +19,7 @@ def test_least_recently_used_programs_are_deleted(tmp_path: Path) -> None:
     left = {800: 4, 799: 3, 600: 3, 599: 2, 200: 1, 199: 0}
     for most, count in left.items():
         remove_oldest(tmp_path, most)
-        assert [(tmp_path / name / "program.bc").exists() for name in
-                ("AB/NEWEST", "path_1f", "AB/OLD", "BC/OLDEST")] == [True] * count + [False] * (4 - count)
+        assert [
+            (tmp_path / name / "program.bc").exists() for name in ("AB/NEWEST", "path_1f", "AB/OLD", "BC/OLDEST")
+        ] == [True] * count + [False] * (4 - count)
     remove_oldest(tmp_path / "absent", 0)

@@ -82,8 +82,13 @@ def test_every_command_and_option_is_in_the_reference(folder: Path) -> None:
     page = unescape((folder / "command_line.html").read_text(encoding="utf-8"))
     for path, command in leaves(commands, "clrt"):
         section = page.partition(f'<h{len(path.split()) + 1} id="{path.replace(" ", "-")}">')[2].partition("<h")[0]
-        options = [option for parameter in command.params if not getattr(parameter, "hidden", False)
-                   for option in parameter.opts if option.startswith("-")]
+        options = [
+            option
+            for parameter in command.params
+            if not getattr(parameter, "hidden", False)
+            for option in parameter.opts
+            if option.startswith("-")
+        ]
         missing = [option for option in options if not re.search(rf"(?<![\w-]){option}(?![\w-])", section)]
         assert section and not missing, (path, missing)
 
@@ -91,5 +96,5 @@ def test_every_command_and_option_is_in_the_reference(folder: Path) -> None:
 def test_annotations_are_as_written(folder: Path) -> None:
     """Not as what their names stand for, such as numpy's dozen types of ArrayLike."""
     text = words((folder / "clrt.html").read_text(encoding="utf-8"))
-    assert "onphase: Callable[[str], None] | None" in text      # one of Renderer's keywords, which a decorator adds
+    assert "onphase: Callable[[str], None] | None" in text  # one of Renderer's keywords, which a decorator adds
     assert "origins: ArrayLike" in text and "fovdegrees: Annotated[float, Gt(0), Lt(180)]" in text

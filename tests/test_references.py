@@ -26,9 +26,11 @@ RECORD: dict[str, Any] = {
         "tint": {"type": "mirror", "color": [0.5, 0.7, 0.9]},
         "glass": {"type": "glass", "ior": 1.5},
     },
-    "shapes": [{"type": "mesh", "file": "floor.ply", "material": "brass", "emission": [3, 2, 1]}] + [
+    "shapes": [{"type": "mesh", "file": "floor.ply", "material": "brass", "emission": [3, 2, 1]}]
+    + [
         {"type": "sphere", "center": [i, 0, 0], "radius": 0.5, "material": material}
-        for i, material in enumerate(["grey", "brass", "white", "tint"])],
+        for i, material in enumerate(["grey", "brass", "white", "tint"])
+    ],
     "lights": [{"type": "point", "position": [0, 3, 0], "intensity": [10, 8, 6]}, {"type": "env", "file": "sky.exr"}],
 }
 PLY = """ply
@@ -65,12 +67,16 @@ def test_everything_arrives(tmp_path: Path) -> None:
     assert [sphere.center[0] for sphere in scene.spheres] == [0, 1, 2, 3]
     metal = MetallicRoughness(color=(0.9, 0.65, 0.35), metallic=1, roughness=0.5, smith="separable")
     assert [sphere.material for sphere in scene.spheres] == [
-        Diffuse(color=(0.5, 0.5, 0.5)), metal, MetallicRoughness(color=(1, 1, 1), metallic=1, roughness=0.6,
-                                                                 smith="separable"), Mirror(color=(0.5, 0.7, 0.9))]
-    floor, = scene.meshes
+        Diffuse(color=(0.5, 0.5, 0.5)),
+        metal,
+        MetallicRoughness(color=(1, 1, 1), metallic=1, roughness=0.6, smith="separable"),
+        Mirror(color=(0.5, 0.7, 0.9)),
+    ]
+    (floor,) = scene.meshes
     assert floor.vertices.tolist() == [[0, 0, 0], [0, 0, 2], [2, 0, 0]] and floor.faces.tolist() == [[0, 1, 2]]
-    assert floor.material == MetallicRoughness(color=(0.9, 0.65, 0.35), metallic=1, roughness=0.5, smith="separable",
-                                               emission=(3, 2, 1))
+    assert floor.material == MetallicRoughness(
+        color=(0.9, 0.65, 0.35), metallic=1, roughness=0.5, smith="separable", emission=(3, 2, 1)
+    )
 
 
 def test_metals_and_ggx_mean_what_the_renderer_of_the_pictures_meant(tmp_path: Path) -> None:
@@ -88,13 +94,26 @@ def test_constant_light_is_the_environments_color(tmp_path: Path) -> None:
     assert list(scene.environment.color) == [1, 2, 3] and scene.environment.image is None and not scene.lights
 
 
-@pytest.mark.parametrize("changes, message", [
-    ({"shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}],
-      "materials": {"m": {"type": "velvet"}}}, "velvet"),
-    ({"shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}],
-      "materials": {"m": {"type": "ggx", "color": [0.5, 1, 1], "alpha": 0.2}}}, "only white"),
-    ({"camera": RECORD["camera"] | {"width": 8}}, "square"),
-])
+@pytest.mark.parametrize(
+    "changes, message",
+    [
+        (
+            {
+                "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}],
+                "materials": {"m": {"type": "velvet"}},
+            },
+            "velvet",
+        ),
+        (
+            {
+                "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}],
+                "materials": {"m": {"type": "ggx", "color": [0.5, 1, 1], "alpha": 0.2}},
+            },
+            "only white",
+        ),
+        ({"camera": RECORD["camera"] | {"width": 8}}, "square"),
+    ],
+)
 def test_what_has_no_counterpart_is_refused(tmp_path: Path, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         load_reference(stored(tmp_path, **changes))

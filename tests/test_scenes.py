@@ -115,8 +115,9 @@ def test_furnace(device: Device) -> None:
             assert np.abs(mean[disc] - 1).max() < 1e-5
             continue
         nodes = np.linspace(0, 0.95, 24)
-        curve = [albedo(sphere.material.lobes.alpha, float(np.sqrt(1 - node**2)), "height_correlated", 200)
-                 for node in nodes]
+        curve = [
+            albedo(sphere.material.lobes.alpha, float(np.sqrt(1 - node**2)), "height_correlated", 200) for node in nodes
+        ]
         expected = np.interp(radii, nodes, curve).mean(axis=(1, 3))[disc].mean()
         error = np.sqrt(variance[disc][:, 0].mean() / disc.sum())
         assert abs(mean[disc].mean() - expected) < 6e-4 + 4 * error
@@ -142,13 +143,20 @@ def test_the_manuals_example_loads_and_renders(tmp_path: Path, device: Device) -
     assert mean.mean() > 0.05
 
 
-TABLES: dict[str, type] = {"[camera]": Camera, "[animation]": Animation, "[[keyframe]]": Keyframe,
-                           "[render]": RenderSettings, "[environment]": Environment,
-                           "[materials.NAME]": Material, "[[mesh]]": MeshTable, "[[instance]]": InstanceTable,
-                           "[[sphere]]": Sphere,
-                           **{f'type = "{kind.kernel}"': kind for kind in (*MATERIALS, *LIGHTS)}}
+TABLES: dict[str, type] = {
+    "[camera]": Camera,
+    "[animation]": Animation,
+    "[[keyframe]]": Keyframe,
+    "[render]": RenderSettings,
+    "[environment]": Environment,
+    "[materials.NAME]": Material,
+    "[[mesh]]": MeshTable,
+    "[[instance]]": InstanceTable,
+    "[[sphere]]": Sphere,
+    **{f'type = "{kind.kernel}"': kind for kind in (*MATERIALS, *LIGHTS)},
+}
 TABLES['type = "phong"` and `type = "blinn_phong"'] = TABLES.pop('type = "phong"')
-del TABLES['type = "blinn_phong"']    # one table for both
+del TABLES['type = "blinn_phong"']  # one table for both
 
 
 @pytest.mark.parametrize("heading", TABLES)

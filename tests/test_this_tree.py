@@ -17,7 +17,8 @@ CHANGES: dict[str, Callable[[Path], object]] = {
     "scene/model.py": lambda file: file.write_text("# another\n"),
     "scene/new.py": lambda file: file.write_text(""),
     "device/programs/cache_files.py": lambda file: file.unlink(),
-    "device": lambda folder: shutil.rmtree(folder)}
+    "device": lambda folder: shutil.rmtree(folder),
+}
 
 
 def test_the_imported_packages_are_this_trees() -> None:
@@ -41,9 +42,13 @@ def test_a_run_in_another_tree_ends_before_its_first_test(tmp_path: Path) -> Non
     shutil.copy(HOUSE / "setup.cfg", tmp_path / "tree")
     with open(tmp_path / "tree" / "kernels" / "core/lanes.cl", "a", encoding="utf-8") as kernel:
         kernel.write("// another\n")
-    done = subprocess.run([sys.executable, "-m", "pytest", "-q", "tests/bench/test_significance.py"],
-                          cwd=tmp_path / "tree", capture_output=True, text=True,
-                          env=os.environ | {"PYTHONSAFEPATH": "1"})
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "tests/bench/test_significance.py"],
+        cwd=tmp_path / "tree",
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONSAFEPATH": "1"},
+    )
     assert done.returncode == pytest.ExitCode.USAGE_ERROR
     assert "clrt.kernels: core/lanes.cl" in done.stderr and "pip install" in done.stderr
     assert "passed" not in done.stdout

@@ -38,6 +38,7 @@ def everywhere(prepare: Callable[[], tuple[Callable[[], object], Callable[[], No
 
 def test_an_event_interrupted_at_any_line_of_set_wakes_others() -> None:
     """Both current and later waiters return once the event is set again."""
+
     def prepare() -> tuple[Callable[[], object], Callable[[], None]]:
         event = Event()
         waits = [beside(lambda: event.wait(LONG)) for _ in range(3)]
@@ -111,6 +112,7 @@ def test_an_exception_sent_to_a_thread_ends_its_wait() -> None:
 
 def test_beside_interrupted_at_any_line_ends() -> None:
     """The work is done at most once, and its result can be requested again."""
+
     def prepare() -> tuple[Callable[[], object], Callable[[], None]]:
         done, results = list[int](), list[Callable[[], None]]()
 

@@ -15,8 +15,16 @@ import pytest
 
 HOUSE = Path(__file__).parents[1]
 #: Files that the steps write.
-WRITTEN = ("spot.png", "converted.toml", "studio.png", "report.json", "error.png", "studio.exr", "spin.gif",
-           "from_python.exr")
+WRITTEN = (
+    "spot.png",
+    "converted.toml",
+    "studio.png",
+    "report.json",
+    "error.png",
+    "studio.exr",
+    "spin.gif",
+    "from_python.exr",
+)
 
 
 def test_every_step_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

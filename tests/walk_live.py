@@ -40,18 +40,21 @@ def main() -> None:
     with Live(scene, device=given.device) as live:
         start = time.perf_counter()
         live.wait(lambda now: now.number > 0)
-        print(f"{time.perf_counter() - start:.2f} s to the first picture, "
-              f"longest wait meanwhile {max(waits):.3f} s")
+        print(f"{time.perf_counter() - start:.2f} s to the first picture, longest wait meanwhile {max(waits):.3f} s")
         walk(live, 2.0)
         waits.clear()
         pictures = walk(live, given.seconds)
         sizes = np.array([each.pixels.shape[1] for each in pictures])
-        print(f"walking: {len(pictures) / given.seconds:.1f} images per second, {np.median(sizes):.0f} of {width} wide "
-              f"({sizes.min()} to {sizes.max()})")
+        print(
+            f"walking: {len(pictures) / given.seconds:.1f} images per second, {np.median(sizes):.0f} of {width} wide "
+            f"({sizes.min()} to {sizes.max()})"
+        )
         live.wait(lambda now: now.pixels.shape[1] == width and now.spp >= 2)
         print(f"edits at rest, seconds to the first picture, small or whole: {latencies(live)}")
-        print(f"waits of another thread beyond its {LOOK} s: median {np.median(waits):.4f}, 99 % "
-              f"{np.percentile(waits, 99):.4f}, longest {max(waits):.4f} s")
+        print(
+            f"waits of another thread beyond its {LOOK} s: median {np.median(waits):.4f}, 99 % "
+            f"{np.percentile(waits, 99):.4f}, longest {max(waits):.4f} s"
+        )
     done.set()
     ticker.join()
 

@@ -28,8 +28,14 @@ FEW_SPHERES = 16
 FEW = 4 * PACK
 
 
-def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle: str = "watertight",
-                   instances: bool = False, tree: bool | None = None) -> str:
+def fitting_layout(
+    device: Device | None,
+    triangles: int,
+    spheres: int,
+    triangle: str = "watertight",
+    instances: bool = False,
+    tree: bool | None = None,
+) -> str:
     """Return the device's layout, or "packs" (brute force) if the SIMD layout would have too few primitives for a BVH.
 
     triangles, spheres: how many are to be in the BVH. tree: True forces a BVH, False forces brute force.
@@ -42,8 +48,14 @@ def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle
     return "packs" if packs and few and tree is None else layout
 
 
-def build_tree(device: Device | None, layout: str, builder: str | None, triangles: Triangles,
-               spheres: FloatArray | None = None, triangle: str = "watertight") -> Layout:
+def build_tree(
+    device: Device | None,
+    layout: str,
+    builder: str | None,
+    triangles: Triangles,
+    spheres: FloatArray | None = None,
+    triangle: str = "watertight",
+) -> Layout:
     """Build the BVH over triangles (m, 3, 3) and spheres (s, 4), float32, finite, of sizes near 1.
 
     builder: a name in BUILDERS or DEVICE_BUILDERS; None selects the fastest. Without a device, and for fewer than two
@@ -65,8 +77,9 @@ def builder_source(device: Device, layout: str, builder: str | None, triangles: 
     builder = _fitting_builder(device, layout, builder, triangles + spheres)
     if builder not in DEVICE_BUILDERS:
         return None
-    return device_builder.program_source(device_builder.SHAPES[layout], triangles > 0, spheres > 0,
-                                         DEVICE_BUILDERS[builder] > 0)
+    return device_builder.program_source(
+        device_builder.SHAPES[layout], triangles > 0, spheres > 0, DEVICE_BUILDERS[builder] > 0
+    )
 
 
 def _fitting_builder(device: Device | None, layout: str, builder: str | None, count: int) -> str:
@@ -78,13 +91,15 @@ def _fitting_builder(device: Device | None, layout: str, builder: str | None, co
     if builder in DEVICE_BUILDERS and (device is None or count < 2):
         return "sah"
     if builder in DEVICE_BUILDERS and layout not in device_builder.SHAPES:
-        raise UsageError(f"the builder {builder} builds {', '.join(device_builder.SHAPES)}, not {layout}; "
-                         "use the builder sah")
+        raise UsageError(
+            f"the builder {builder} builds {', '.join(device_builder.SHAPES)}, not {layout}; use the builder sah"
+        )
     return builder
 
 
-def _over_corners(device: Device | None, layout: str, builder: str | None, triangles: Triangles,
-                  spheres: FloatArray) -> Layout:
+def _over_corners(
+    device: Device | None, layout: str, builder: str | None, triangles: Triangles, spheres: FloatArray
+) -> Layout:
     builder = _fitting_builder(device, layout, builder, len(triangles) + len(spheres))
     if builder not in DEVICE_BUILDERS or device is None:
         return pack(layout, builder, np.asarray(triangles), spheres)
@@ -92,8 +107,21 @@ def _over_corners(device: Device | None, layout: str, builder: str | None, trian
     shape = device_builder.SHAPES[layout]
     tree = device_builder.build_tree(device, shape, triangles, spheres, DEVICE_BUILDERS[builder])
     names, dtypes = ("nodes", shape.leaves, "leaf_spheres"), (shape.node, shape.leaf, LEAF_SPHERE)
-    buffers = {name: DeviceArray(buffer, dtype, size)
-               for name, buffer, dtype, size in zip(names, tree.arrays, dtypes, tree.counts) if size}
+    buffers = {
+        name: DeviceArray(buffer, dtype, size)
+        for name, buffer, dtype, size in zip(names, tree.arrays, dtypes, tree.counts)
+        if size
+    }
     seconds = time.perf_counter() - start
-    return Layout(layout, buffers, tree.stack, tree.nodes, tree.depth, tree.sah_cost, seconds, builder,
-                  tuple(tree.level_sizes), tree.peak_bytes)
+    return Layout(
+        layout,
+        buffers,
+        tree.stack,
+        tree.nodes,
+        tree.depth,
+        tree.sah_cost,
+        seconds,
+        builder,
+        tuple(tree.level_sizes),
+        tree.peak_bytes,
+    )

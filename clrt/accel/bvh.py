@@ -80,8 +80,10 @@ class Bvh:
 
         `pack` triangles of a leaf are intersected at the cost of one; spheres are not packed.
         """
-        return expected_work(half_area(self.aabb_min, self.aabb_max),
-                             np.where(self.leaf, intersections(self.count, self.spheres, pack), not self.empty))
+        return expected_work(
+            half_area(self.aabb_min, self.aabb_max),
+            np.where(self.leaf, intersections(self.count, self.spheres, pack), not self.empty),
+        )
 
 
 def intersections(count: IntArray, spheres: BoolArray, pack: int) -> IntArray:

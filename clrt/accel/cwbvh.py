@@ -37,8 +37,18 @@ MAX_LEAF = 3
 #: A node's primitives are contiguous, its leaves in any order. Hence at most one node, the root, has leaves of both
 #: kinds; its triangles are the last ones and its spheres the first. Any slot may hold any child: the order of
 #: `octant_slots` only makes rays visit near children first.
-CWBVH_NODE = np.dtype([("origin", "f4", 3), ("exponent", "u1", 3), ("imask", "u1"), ("child", "u4"),
-                       ("primitive", "u4"), ("meta", "u1", SLOTS), ("lo", "u1", (3, SLOTS)), ("hi", "u1", (3, SLOTS))])
+CWBVH_NODE = np.dtype(
+    [
+        ("origin", "f4", 3),
+        ("exponent", "u1", 3),
+        ("imask", "u1"),
+        ("child", "u4"),
+        ("primitive", "u4"),
+        ("meta", "u1", SLOTS),
+        ("lo", "u1", (3, SLOTS)),
+        ("hi", "u1", (3, SLOTS)),
+    ]
+)
 
 #: (slot, axis): the corner of a node that a slot corresponds to; bit a of the slot is set on the high side of axis a.
 _CORNERS = np.where(np.arange(SLOTS)[:, None] >> np.arange(3) & 1, 1.0, -1.0)

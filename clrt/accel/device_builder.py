@@ -55,8 +55,10 @@ LARGEST_ARRAY = 192
 SHAPES = {
     "bvh8": BuilderLayout("build/bvh8.cl", LANES, LANES, LANES, BVH8_NODE, TRIANGLE_PACK, "packs"),
     "bvh2": BuilderLayout("build/bvh2.cl", 2, LEAF_SIZES["sah"], 1, BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", (2, 2)),
-    "cwbvh": BuilderLayout("build/cwbvh.cl", SLOTS, MAX_LEAF, MAX_LEAF, CWBVH_NODE, LEAF_TRIANGLE, "leaf_triangles",
-                           compressed=True)}
+    "cwbvh": BuilderLayout(
+        "build/cwbvh.cl", SLOTS, MAX_LEAF, MAX_LEAF, CWBVH_NODE, LEAF_TRIANGLE, "leaf_triangles", compressed=True
+    ),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +84,9 @@ def fits(device: Device | None, count: int) -> bool:
     return device is not None and count * LARGEST_ARRAY <= device.info.max_alloc_bytes
 
 
-def build_tree(device: Device, shape: BuilderLayout, triangles: Triangles, spheres: FloatArray,
-               reinsertions: int = 0) -> DeviceTree:
+def build_tree(
+    device: Device, shape: BuilderLayout, triangles: Triangles, spheres: FloatArray, reinsertions: int = 0
+) -> DeviceTree:
     """Build the BVH over at least two primitives: triangles, spheres (s, 4), with finite coordinates below 1e18.
 
     reinsertions: number of optimisation passes. Raises SceneError for more than MAX_PRIMITIVES in all, and NoRoomError.
@@ -91,8 +94,10 @@ def build_tree(device: Device, shape: BuilderLayout, triangles: Triangles, spher
     if (count := len(triangles) + len(spheres)) > MAX_PRIMITIVES:
         raise SceneError(f"{count} primitives, but a device builds BVHs over {MAX_PRIMITIVES}; use the builder sah")
     if not fits(device, count):
-        raise NoRoomError(f"building a BVH over {count} primitives needs larger buffers than the "
-                          f"{device.info.max_alloc_bytes} bytes that {device.info.name} allows; use the builder sah")
+        raise NoRoomError(
+            f"building a BVH over {count} primitives needs larger buffers than the "
+            f"{device.info.max_alloc_bytes} bytes that {device.info.name} allows; use the builder sah"
+        )
     source = program_source(shape, len(triangles) > 0, len(spheres) > 0, reinsertions > 0)
     work = DataParallel(device, source, count * SHAPE * 4)
     primitives = sort_primitives(work, triangles, spheres)
@@ -106,14 +111,31 @@ def build_tree(device: Device, shape: BuilderLayout, triangles: Triangles, spher
 
 def program_source(shape: BuilderLayout, triangles: bool, spheres: bool, reinsertions: bool) -> str:
     """Return the builder's program, for scenes with triangles, with spheres, and with reinsertion passes."""
-    values = {"CHILDREN": shape.children, "LEAF_SIZE": shape.leaf_size, "PACK": shape.pack, "EMPTY": EMPTY,
-              "SLOW": SLOW, "LANES": math.prod(shape.leaf["primitive"].shape), "TRIANGLES": int(triangles),
-              "SPHERES": int(spheres), "GROUPS": int(shape.compressed),
-              "ONE_KIND": int(shape.compressed and triangles and spheres)}
-    records = {"BinaryNode": BINARY_NODE, "Move": MOVE, "World": WORLD, "Node": shape.node, "Triangles": shape.leaf,
-               "LeafSphere": LEAF_SPHERE}
-    files = {"REINSERTION": ["build/reinsert.cl"] if reinsertions else [],
-             "SLOTS": ["build/slots_octant.cl" if shape.compressed else "build/slots.cl"], "WRITER": [shape.writer]}
+    values = {
+        "CHILDREN": shape.children,
+        "LEAF_SIZE": shape.leaf_size,
+        "PACK": shape.pack,
+        "EMPTY": EMPTY,
+        "SLOW": SLOW,
+        "LANES": math.prod(shape.leaf["primitive"].shape),
+        "TRIANGLES": int(triangles),
+        "SPHERES": int(spheres),
+        "GROUPS": int(shape.compressed),
+        "ONE_KIND": int(shape.compressed and triangles and spheres),
+    }
+    records = {
+        "BinaryNode": BINARY_NODE,
+        "Move": MOVE,
+        "World": WORLD,
+        "Node": shape.node,
+        "Triangles": shape.leaf,
+        "LeafSphere": LEAF_SPHERE,
+    }
+    files = {
+        "REINSERTION": ["build/reinsert.cl"] if reinsertions else [],
+        "SLOTS": ["build/slots_octant.cl" if shape.compressed else "build/slots.cl"],
+        "WRITER": [shape.writer],
+    }
     return compose("\n".join([defines(values), typedefs(records)]), "build/builder.cl", files)
 
 
@@ -193,8 +215,19 @@ def _write(work: DataParallel, shape: BuilderLayout, plan: _Plan, levels: list[_
     areas = work.zeros(np.float32, blocks)
     node = triangle = sphere = 0
     for level in levels:
-        work.run("write_level", level.count, *plan.arguments, level.slots, level.places, node, node + level.count,
-                 triangle, sphere, *arrays, areas)
+        work.run(
+            "write_level",
+            level.count,
+            *plan.arguments,
+            level.slots,
+            level.places,
+            node,
+            node + level.count,
+            triangle,
+            sphere,
+            *arrays,
+            areas,
+        )
         node, triangle, sphere = node + level.count, triangle + level.records[1], sphere + level.records[2]
         work.free(*level.arrays)
     area = plan.area + float(work.download(areas, np.float32, blocks).sum(dtype=np.float64))

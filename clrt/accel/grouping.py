@@ -19,7 +19,7 @@ def packs_of(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[IntA
     """Group triangles with boxes (n, 3) into packs of at most `size`, group by group, the members of each ascending."""
     count = len(aabb_min)
     together = _groups(aabb_min, aabb_max, size) if size < count <= MOST else [np.arange(count)]
-    return [group[first:first + size].astype(np.int32) for group in together for first in range(0, len(group), size)]
+    return [group[first : first + size].astype(np.int32) for group in together for first in range(0, len(group), size)]
 
 
 def _groups(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[NDArray[np.intp]]:
@@ -55,8 +55,8 @@ def _groups(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[NDArr
         saved, part = best[k]
         if saved <= 0:
             return [np.flatnonzero(group) for group in found]
-        found[k:k + 1] = [found[k] & ~part, part]
-        best[k:k + 1] = [best_part(group) for group in found[k:k + 2]]
+        found[k : k + 1] = [found[k] & ~part, part]
+        best[k : k + 1] = [best_part(group) for group in found[k : k + 2]]
 
 
 def _joined(low: Doubles, high: Doubles) -> BoolArray:

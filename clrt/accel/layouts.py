@@ -44,19 +44,31 @@ PACK = 16
 BVH2_NODE = np.dtype([("aabb_min", "f4", 3), ("left_first", "i4"), ("aabb_max", "f4", 3), ("count", "i4")])
 #: `child` as in Wide, but the `first` of a triangle leaf is the index of its pack.
 BVH8_NODE = np.dtype([("lo", "f4", (3, LANES)), ("hi", "f4", (3, LANES)), ("child", "i4", LANES), ("pad", "i4", LANES)])
-LEAF_TRIANGLE = np.dtype([("p0", "f4", 3), ("primitive", "i4"), ("p1", "f4", 3), ("pad1", "i4"),
-                          ("p2", "f4", 3), ("pad2", "i4")])
+LEAF_TRIANGLE = np.dtype(
+    [("p0", "f4", 3), ("primitive", "i4"), ("p1", "f4", 3), ("pad1", "i4"), ("p2", "f4", 3), ("pad2", "i4")]
+)
 #: Padding of a triangle's box, as a fraction of its longest side: the test moves corners by a few roundings of their
 #: distance from the ray's origin, and a sliver's corners may be far from the hit point. Also in
 #: kernels/build/primitives.cl.
 TRIANGLE_PAD = 2.0**-21
 #: Unused lanes have NaN vertices and primitive −1.
-TRIANGLE_PACK = np.dtype([("p0", "f4", (3, LANES)), ("p1", "f4", (3, LANES)), ("p2", "f4", (3, LANES)),
-                          ("primitive", "i4", LANES)])
+TRIANGLE_PACK = np.dtype(
+    [("p0", "f4", (3, LANES)), ("p1", "f4", (3, LANES)), ("p2", "f4", (3, LANES)), ("primitive", "i4", LANES)]
+)
 #: lo, hi: the box of its triangles. extent, count: of all packs, the largest absolute coordinate and their number.
-LONE_PACK = np.dtype([("p0", "f4", (3, PACK)), ("p1", "f4", (3, PACK)), ("p2", "f4", (3, PACK)),
-                      ("primitive", "i4", PACK), ("lo", "f4", 3), ("hi", "f4", 3), ("extent", "f4"), ("count", "i4"),
-                      ("pad", "f4", PACK - 8)])
+LONE_PACK = np.dtype(
+    [
+        ("p0", "f4", (3, PACK)),
+        ("p1", "f4", (3, PACK)),
+        ("p2", "f4", (3, PACK)),
+        ("primitive", "i4", PACK),
+        ("lo", "f4", 3),
+        ("hi", "f4", 3),
+        ("extent", "f4"),
+        ("count", "i4"),
+        ("pad", "f4", PACK - 8),
+    ]
+)
 LEAF_SPHERE = np.dtype([("center", "f4", 3), ("radius", "f4"), ("primitive", "i4"), ("pad", "i4", 3)])
 
 #: Maximum primitives per leaf if they are intersected one by one; Nadolny 2026, 5.4.4 for the midpoint.
@@ -116,8 +128,10 @@ def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) 
 
 
 def _list(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
-    buffers = _filled(leaf_triangles=_leaf_triangles(triangles, np.arange(len(triangles), dtype=np.int32)),
-                      leaf_spheres=leaf_spheres(spheres, np.arange(len(spheres), dtype=np.int32), len(triangles)))
+    buffers = _filled(
+        leaf_triangles=_leaf_triangles(triangles, np.arange(len(triangles), dtype=np.int32)),
+        leaf_spheres=leaf_spheres(spheres, np.arange(len(spheres), dtype=np.int32), len(triangles)),
+    )
     return Layout("list", buffers, stack=0, nodes=0, depth=0, work=float(len(triangles) + len(spheres)))
 
 
@@ -137,10 +151,19 @@ def _packs(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
 
 def _bvh2(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     tree = _tree(builder, triangles, spheres, LEAF_SIZES[builder], 1)
-    buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
-                      leaf_spheres=leaf_spheres(spheres, tree.sphere_order, len(triangles)))
-    return Layout("bvh2", {"nodes": bvh2_nodes(tree)} | buffers, stack=tree.stack_bound, nodes=len(tree.count),
-                  depth=tree.depth, work=tree.sah_cost(), level_sizes=_level_sizes(tree))
+    buffers = _filled(
+        leaf_triangles=_leaf_triangles(triangles, tree.order),
+        leaf_spheres=leaf_spheres(spheres, tree.sphere_order, len(triangles)),
+    )
+    return Layout(
+        "bvh2",
+        {"nodes": bvh2_nodes(tree)} | buffers,
+        stack=tree.stack_bound,
+        nodes=len(tree.count),
+        depth=tree.depth,
+        work=tree.sah_cost(),
+        level_sizes=_level_sizes(tree),
+    )
 
 
 def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
@@ -153,29 +176,51 @@ def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     child[leaf] = leaf_reference(first, sphere, count)
     nodes = wide_nodes(wide, child)
     buffers = _filled(packs=packs, leaf_spheres=leaf_spheres(spheres, wide.sphere_order, len(triangles)))
-    return Layout("bvh8", {"nodes": nodes} | buffers, stack=wide.stack_bound, nodes=len(nodes),
-                  depth=wide.depth, work=wide.sah_cost(LANES), level_sizes=_level_sizes(wide))
+    return Layout(
+        "bvh8",
+        {"nodes": nodes} | buffers,
+        stack=wide.stack_bound,
+        nodes=len(nodes),
+        depth=wide.depth,
+        work=wide.sah_cost(LANES),
+        level_sizes=_level_sizes(wide),
+    )
 
 
 def _cwbvh(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     # A leaf costs as much as a node, regardless of its size: a third fewer nodes than at a cost of 1 per triangle, and
     # as fast.
     tree = compress(_tree(builder, triangles, spheres, MAX_LEAF, MAX_LEAF))
-    buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
-                      leaf_spheres=leaf_spheres(spheres, tree.sphere_order, len(triangles)))
-    return Layout("cwbvh", {"nodes": tree.nodes} | buffers, stack=tree.stack, nodes=len(tree.nodes),
-                  depth=tree.wide.depth, work=tree.wide.sah_cost(MAX_LEAF))
+    buffers = _filled(
+        leaf_triangles=_leaf_triangles(triangles, tree.order),
+        leaf_spheres=leaf_spheres(spheres, tree.sphere_order, len(triangles)),
+    )
+    return Layout(
+        "cwbvh",
+        {"nodes": tree.nodes} | buffers,
+        stack=tree.stack,
+        nodes=len(tree.nodes),
+        depth=tree.wide.depth,
+        work=tree.wide.sah_cost(MAX_LEAF),
+    )
 
 
 LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {
-    "list": _list, "packs": _packs, "bvh2": _bvh2, "bvh8": _bvh8, "cwbvh": _cwbvh}
+    "list": _list,
+    "packs": _packs,
+    "bvh2": _bvh2,
+    "bvh8": _bvh8,
+    "cwbvh": _cwbvh,
+}
 
 
 def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: int, lanes: int) -> Bvh:
     """Build one BVH over both kinds; triangles are intersected `lanes` at a time, spheres one by one."""
     build = BUILDERS[builder]
-    return join(build(*triangle_boxes(triangles), leaf_size, lanes),
-                build(*sphere_boxes(spheres), min(LEAF_SIZES[builder], leaf_size), 1))
+    return join(
+        build(*triangle_boxes(triangles), leaf_size, lanes),
+        build(*sphere_boxes(spheres), min(LEAF_SIZES[builder], leaf_size), 1),
+    )
 
 
 def triangle_boxes(triangles: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -205,8 +250,12 @@ def bvh2_nodes(tree: Bvh) -> Records:
     """Return the nodes of the layout bvh2."""
     links = np.where(tree.leaf, tree.left_first, tree.left_first + (tree.left_first > 0))
     nodes = np.zeros(1 + len(tree.count), BVH2_NODE)
-    for name, values in (("aabb_min", tree.aabb_min), ("aabb_max", tree.aabb_max), ("left_first", links),
-                         ("count", np.where(tree.spheres, -tree.count, tree.count))):
+    for name, values in (
+        ("aabb_min", tree.aabb_min),
+        ("aabb_max", tree.aabb_max),
+        ("left_first", links),
+        ("count", np.where(tree.spheres, -tree.count, tree.count)),
+    ):
         nodes[name][0], nodes[name][2:] = values[0], values[1:]
     nodes[1]["aabb_min"], nodes[1]["aabb_max"] = np.inf, -np.inf
     return nodes
@@ -240,8 +289,9 @@ def leaf_spheres(spheres: FloatArray, order: IntArray, first_primitive: int) -> 
     return records
 
 
-def _filled_packs(dtype: np.dtype[np.void], triangles: FloatArray, order: IntArray, first: IntArray,
-                  count: IntArray) -> Records:
+def _filled_packs(
+    dtype: np.dtype[np.void], triangles: FloatArray, order: IntArray, first: IntArray, count: IntArray
+) -> Records:
     """Pack the triangles order[first:first + count] of each leaf."""
     lane = np.arange(dtype["primitive"].shape[0], dtype=np.int32)
     live = lane < count[:, None]

@@ -29,8 +29,10 @@ class RefitLayout(NamedTuple):
     gap: int
 
 
-RECIPES = {"bvh8": RefitLayout("build/refit_bvh8.cl", BVH8_NODE, TRIANGLE_PACK, "packs", 0),
-           "bvh2": RefitLayout("build/refit_bvh2.cl", BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", 1)}
+RECIPES = {
+    "bvh8": RefitLayout("build/refit_bvh8.cl", BVH8_NODE, TRIANGLE_PACK, "packs", 0),
+    "bvh2": RefitLayout("build/refit_bvh2.cl", BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", 1),
+}
 
 
 def can_refit(tree: Layout) -> bool:
@@ -57,14 +59,22 @@ class Refitter:
         end = sum(self._levels)
         for level in reversed(range(len(self._levels))):
             first = end - self._levels[level]
-            self._work.run("refit_level", self._levels[level], first + self._recipe.gap * (level > 0),
-                           self._vertices.buffer, self._faces, *self._tree)
+            self._work.run(
+                "refit_level",
+                self._levels[level],
+                first + self._recipe.gap * (level > 0),
+                self._vertices.buffer,
+                self._faces,
+                *self._tree,
+            )
             end = first
 
 
 def program_source(layout: str) -> str:
     """Return the program that refits BVHs of a layout."""
     recipe = RECIPES[layout]
-    preamble = [defines({"EMPTY": EMPTY, "TRIANGLES": 1, "SPHERES": 0}),
-                typedefs({"Node": recipe.node, "Triangles": recipe.leaf})]
+    preamble = [
+        defines({"EMPTY": EMPTY, "TRIANGLES": 1, "SPHERES": 0}),
+        typedefs({"Node": recipe.node, "Triangles": recipe.leaf}),
+    ]
     return compose("\n".join(preamble), recipe.file, {})

@@ -60,8 +60,19 @@ def _level(work: DataParallel, primitives: Primitives, tree: BinaryTree) -> Leve
         counts = work.empty(np.uint32, work.number(below))
         work.run("count_below", below, tree.nodes, root, listed, sum(sizes), counts)
         work.scan(counts, work.number(below))
-        work.run("write_binary_level", below, tree.nodes, root, listed, sum(sizes), len(sizes), counts, nodes, parents,
-                 levels)
+        work.run(
+            "write_binary_level",
+            below,
+            tree.nodes,
+            root,
+            listed,
+            sum(sizes),
+            len(sizes),
+            counts,
+            nodes,
+            parents,
+            levels,
+        )
         work.free(counts)
         sizes.append(below)
         (below,) = work.sums()

@@ -56,9 +56,15 @@ class OpenNodes:
         """Return the nodes in batches of NODES_AT_ONCE."""
         cuts = np.arange(0, len(self.count), NODES_AT_ONCE)
         edges = np.append(self.start[cuts], len(self.ids))
-        return [OpenNodes(self.boxes[:, low:high], self.ids[low:high],
-                          self.first[cut:cut + NODES_AT_ONCE], self.count[cut:cut + NODES_AT_ONCE])
-                for cut, low, high in zip(cuts, edges[:-1], edges[1:])]
+        return [
+            OpenNodes(
+                self.boxes[:, low:high],
+                self.ids[low:high],
+                self.first[cut : cut + NODES_AT_ONCE],
+                self.count[cut : cut + NODES_AT_ONCE],
+            )
+            for cut, low, high in zip(cuts, edges[:-1], edges[1:])
+        ]
 
     def split(self, right: BoolArray) -> OpenNodes:
         """Return the children, left and right alternating: a stable partition of each node by `right` (P,)."""
@@ -68,9 +74,12 @@ class OpenNodes:
         here = np.arange(len(right), dtype=np.int32)
         source = np.empty(len(right), np.intp)
         source[np.where(right, self.spread(self.start + lefts - 1) + rank, here - rank)] = here
-        return OpenNodes(self.boxes.take(source, axis=1), self.ids.take(source),
-                         np.stack([self.first, self.first + lefts], axis=1).ravel(),
-                         np.stack([lefts, rights], axis=1).ravel())
+        return OpenNodes(
+            self.boxes.take(source, axis=1),
+            self.ids.take(source),
+            np.stack([self.first, self.first + lefts], axis=1).ravel(),
+            np.stack([lefts, rights], axis=1).ravel(),
+        )
 
 
 #: A split rule returns which primitives go right, (P,) bool. If none (or all) of a node's do, the node is not split.
@@ -87,8 +96,12 @@ def grow(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, small: int,
     if len(aabb_min) == 0:
         return empty_tree()
     total = len(aabb_min)
-    nodes = OpenNodes(np.concatenate([aabb_min.T, -aabb_max.T]), np.arange(total, dtype=np.int32),
-                      np.zeros(1, np.int32), np.full(1, total, np.int32))
+    nodes = OpenNodes(
+        np.concatenate([aabb_min.T, -aabb_max.T]),
+        np.arange(total, dtype=np.int32),
+        np.zeros(1, np.int32),
+        np.full(1, total, np.int32),
+    )
     order = np.empty(total, np.int32)
     bounds, left_first, count, made = [], [], [], 1
     for level in naturals():
@@ -104,9 +117,15 @@ def grow(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, small: int,
         made += 2 * int(np.count_nonzero(~leaf))
         nodes = nodes.select(~leaf).split(right[~closed])
     boxes = np.concatenate(bounds, axis=1).T
-    return Bvh(np.ascontiguousarray(boxes[:, :3]), np.ascontiguousarray(-boxes[:, 3:]),
-               np.concatenate(left_first).astype(np.int32), np.concatenate(count).astype(np.int32),
-               np.zeros(len(boxes), bool), order, np.empty(0, np.int32))
+    return Bvh(
+        np.ascontiguousarray(boxes[:, :3]),
+        np.ascontiguousarray(-boxes[:, 3:]),
+        np.concatenate(left_first).astype(np.int32),
+        np.concatenate(count).astype(np.int32),
+        np.zeros(len(boxes), bool),
+        order,
+        np.empty(0, np.int32),
+    )
 
 
 def _nowhere(nodes: OpenNodes) -> BoolArray:

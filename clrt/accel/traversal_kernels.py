@@ -10,11 +10,19 @@ from .layouts import NO_RAYS, PACK, Layout
 from .methods import HitTests as HitTests, TriangleTest
 
 #: Traversal files by layout, and the number of triangles per record.
-TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "cwbvh": ("traverse/cwbvh.cl", 1),
-         "list": ("traverse/list.cl", 1), "packs": ("traverse/packs.cl", PACK)}
+TREES = {
+    "bvh8": ("traverse/bvh8.cl", 8),
+    "bvh2": ("traverse/bvh2.cl", 1),
+    "cwbvh": ("traverse/cwbvh.cl", 1),
+    "list": ("traverse/list.cl", 1),
+    "packs": ("traverse/packs.cl", PACK),
+}
 #: Traversal files for instances, by layout.
-UPPER_LEVELS = {"bvh8": "traverse/instance.cl", "bvh2": "traverse/slab_instance.cl",
-                "cwbvh": "traverse/slab_instance.cl"}
+UPPER_LEVELS = {
+    "bvh8": "traverse/instance.cl",
+    "bvh2": "traverse/slab_instance.cl",
+    "cwbvh": "traverse/slab_instance.cl",
+}
 #: Builders by name.
 BUILDER_NAMES = [*DEVICE_BUILDERS, *BUILDERS]
 TRIANGLE_TESTS = {name: f"geometry/triangle_{name}.cl" for name in get_args(TriangleTest)}
@@ -22,8 +30,14 @@ TRIANGLE_TESTS = {name: f"geometry/triangle_{name}.cl" for name in get_args(Tria
 PACKS_TEST = "geometry/triangle_watertight_packs.cl"
 BOX_TESTS = {"robust": "geometry/box_robust.cl", "plain": "geometry/box_plain.cl"}
 SPHERE_TESTS = {"robust": "geometry/sphere.cl", "textbook": "geometry/sphere_textbook.cl"}
-RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles", "leaf_spheres": "LeafSphere",
-           "instances": "Instance", "visits": "Visits"}
+RECORDS = {
+    "nodes": "Node",
+    "packs": "Triangles",
+    "leaf_triangles": "Triangles",
+    "leaf_spheres": "LeafSphere",
+    "instances": "Instance",
+    "visits": "Visits",
+}
 
 
 def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
@@ -44,13 +58,18 @@ def tree_defines(tree: Layout) -> dict[str, int]:
 
 def tree_features(triangles: bool, spheres: bool, lone: bool = False, rays: bool = True) -> dict[str, bool]:
     """Return the feature flags of kernels/traverse. lone: spheres are not in the BVH; rays: whether rays are traced."""
-    return {"TRIANGLES": triangles, "LEAF_SPHERES": rays and spheres and not lone,
-            "LONE_SPHERES": rays and spheres and lone, "IN_TREE": rays and (triangles or (spheres and not lone)),
-            "PRIMITIVES": triangles or spheres}
+    return {
+        "TRIANGLES": triangles,
+        "LEAF_SPHERES": rays and spheres and not lone,
+        "LONE_SPHERES": rays and spheres and lone,
+        "IN_TREE": rays and (triangles or (spheres and not lone)),
+        "PRIMITIVES": triangles or spheres,
+    }
 
 
-def tree_files(layout: str, tests: HitTests, triangles: bool, spheres: bool, lone: bool = False,
-               instances: bool = False) -> dict[str, list[str]]:
+def tree_files(
+    layout: str, tests: HitTests, triangles: bool, spheres: bool, lone: bool = False, instances: bool = False
+) -> dict[str, list[str]]:
     """Return the files for the includes of kernels/traverse, for a scene with triangles, spheres or neither.
 
     layout: one of TREES, or that of NO_RAYS.
@@ -59,9 +78,11 @@ def tree_files(layout: str, tests: HitTests, triangles: bool, spheres: bool, lon
     if layout == NO_RAYS.name:
         return {"TREE": [], "LONE_SPHERES_FILE": [], "SPHERE_TEST": sphere_test}
     triangle_test = PACKS_TEST if layout == "packs" else TRIANGLE_TESTS[tests.triangle]
-    return {"TREE": [TREES[layout][0]] if triangles or (spheres and not lone) else [],
-            "LONE_SPHERES_FILE": ["traverse/lone_spheres.cl"] if lone else [],
-            "BOX_TEST": [BOX_TESTS[tests.box]],
-            "TRIANGLE_TEST": [triangle_test] if triangles else [],
-            "UPPER_LEVEL": [UPPER_LEVELS[layout]] if instances else [],
-            "SPHERE_TEST": sphere_test}
+    return {
+        "TREE": [TREES[layout][0]] if triangles or (spheres and not lone) else [],
+        "LONE_SPHERES_FILE": ["traverse/lone_spheres.cl"] if lone else [],
+        "BOX_TEST": [BOX_TESTS[tests.box]],
+        "TRIANGLE_TEST": [triangle_test] if triangles else [],
+        "UPPER_LEVEL": [UPPER_LEVELS[layout]] if instances else [],
+        "SPHERE_TEST": sphere_test,
+    }

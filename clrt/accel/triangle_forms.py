@@ -22,16 +22,35 @@ Doubles = NDArray[np.float64]
 #: Records converted at a time.
 CHUNK = 1 << 16
 
-PRECOMPUTED_TRIANGLE = np.dtype([("p0", "f4", 3), ("primitive", "i4"), ("e1", "f4", 3), ("pad1", "i4"),
-                                 ("e2", "f4", 3), ("pad2", "i4"), ("n", "f4", 3), ("pad3", "i4")])
-PRECOMPUTED_PACK = np.dtype([("p0", "f4", (3, LANES)), ("e1", "f4", (3, LANES)), ("e2", "f4", (3, LANES)),
-                             ("n", "f4", (3, LANES)), ("primitive", "i4", LANES)])
+PRECOMPUTED_TRIANGLE = np.dtype(
+    [
+        ("p0", "f4", 3),
+        ("primitive", "i4"),
+        ("e1", "f4", 3),
+        ("pad1", "i4"),
+        ("e2", "f4", 3),
+        ("pad2", "i4"),
+        ("n", "f4", 3),
+        ("pad3", "i4"),
+    ]
+)
+PRECOMPUTED_PACK = np.dtype(
+    [
+        ("p0", "f4", (3, LANES)),
+        ("e1", "f4", (3, LANES)),
+        ("e2", "f4", (3, LANES)),
+        ("n", "f4", (3, LANES)),
+        ("primitive", "i4", LANES),
+    ]
+)
 #: All twelve entries of the transform, though one column is always (0, 0, 1): it differs between the triangles of a
 #: pack, for which nine entries would need more selections than they save products.
-BALDWIN_WEBER_TRIANGLE = np.dtype([("u", "f4", 4), ("v", "f4", 4), ("w", "f4", 4), ("primitive", "i4"),
-                                   ("pad", "i4", 3)])
-BALDWIN_WEBER_PACK = np.dtype([("u", "f4", (4, LANES)), ("v", "f4", (4, LANES)), ("w", "f4", (4, LANES)),
-                               ("primitive", "i4", LANES)])
+BALDWIN_WEBER_TRIANGLE = np.dtype(
+    [("u", "f4", 4), ("v", "f4", 4), ("w", "f4", 4), ("primitive", "i4"), ("pad", "i4", 3)]
+)
+BALDWIN_WEBER_PACK = np.dtype(
+    [("u", "f4", (4, LANES)), ("v", "f4", (4, LANES)), ("w", "f4", (4, LANES)), ("primitive", "i4", LANES)]
+)
 
 
 def _precomputed(p0: Doubles, p1: Doubles, p2: Doubles) -> dict[str, Doubles]:
@@ -66,8 +85,10 @@ class TriangleForm(NamedTuple):
 
 
 #: Forms by test; the other tests use corners.
-FORMS = {"precomputed": TriangleForm(PRECOMPUTED_TRIANGLE, PRECOMPUTED_PACK, _precomputed),
-         "baldwin_weber": TriangleForm(BALDWIN_WEBER_TRIANGLE, BALDWIN_WEBER_PACK, _baldwin_weber)}
+FORMS = {
+    "precomputed": TriangleForm(PRECOMPUTED_TRIANGLE, PRECOMPUTED_PACK, _precomputed),
+    "baldwin_weber": TriangleForm(BALDWIN_WEBER_TRIANGLE, BALDWIN_WEBER_PACK, _baldwin_weber),
+}
 
 
 def in_form(tree: Layout, triangle: str, device: Device | None) -> Layout:
@@ -76,8 +97,11 @@ def in_form(tree: Layout, triangle: str, device: Device | None) -> Layout:
         return tree
     start, form = time.perf_counter(), FORMS[triangle]
     dtypes = {"packs": form.pack, "leaf_triangles": form.leaf}
-    corners = {name: on_host(device, tree.buffers[name]) if device else tree.buffers[name]
-               for name in dtypes if name in tree.buffers}
+    corners = {
+        name: on_host(device, tree.buffers[name]) if device else tree.buffers[name]
+        for name in dtypes
+        if name in tree.buffers
+    }
     changed = {name: _converted(records, dtypes[name], form) for name, records in corners.items()}
     seconds = tree.build_seconds + time.perf_counter() - start
     return replace(tree, buffers={**tree.buffers, **changed}, build_seconds=seconds)

@@ -44,8 +44,16 @@ class TwoLevelBvh:
     Raises UsageError for a layout that does not support an upper level.
     """
 
-    def __init__(self, device: Device | None, layout: str, builder: str | None, meshes: Sequence[FloatArray],
-                 mesh: IntArray, triangle: str = "watertight", spheres: FloatArray | None = None) -> None:
+    def __init__(
+        self,
+        device: Device | None,
+        layout: str,
+        builder: str | None,
+        meshes: Sequence[FloatArray],
+        mesh: IntArray,
+        triangle: str = "watertight",
+        spheres: FloatArray | None = None,
+    ) -> None:
         check_choice("layout", layout, LAYOUTS)
         if layout not in FORMS:
             raise UsageError(f"the layout {layout} is not a BVH, which instances need; use one of {', '.join(FORMS)}")
@@ -82,9 +90,15 @@ class TwoLevelBvh:
         put(self._device, self._buffers["nodes"], upper.buffers["nodes"])
         put(self._device, self._buffers["instances"], instances)
         # The stack holds the upper level's entries, LEAVE, and the lower level's entries.
-        return replace(upper, buffers=self._buffers, stack=upper.stack + 1 + self._stack,
-                       nodes=upper.nodes + self._nodes, depth=upper.depth + self._depth, builder=self._builder,
-                       build_seconds=self._seconds + time.perf_counter() - start)
+        return replace(
+            upper,
+            buffers=self._buffers,
+            stack=upper.stack + 1 + self._stack,
+            nodes=upper.nodes + self._nodes,
+            depth=upper.depth + self._depth,
+            builder=self._builder,
+            build_seconds=self._seconds + time.perf_counter() - start,
+        )
 
     def _joined(self, trees: Sequence[Layout]) -> tuple[dict[str, DeviceArray | NDArray[Any]], NDArray[np.int64]]:
         """Return the buffers with the BVHs' records concatenated, and the indices of their roots, (m,)."""

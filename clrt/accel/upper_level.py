@@ -47,22 +47,25 @@ def _bvh2(tree: Bvh) -> tuple[Layout, IntArray]:
 
 def _bvh8(tree: Bvh) -> tuple[Layout, IntArray]:
     wide = collapse(tree, LANES)
-    layout = Layout("bvh8", {"nodes": wide_nodes(wide, wide.child)}, wide.stack_bound, len(wide.child), wide.depth,
-                    wide.sah_cost())
+    layout = Layout(
+        "bvh8", {"nodes": wide_nodes(wide, wide.child)}, wide.stack_bound, len(wide.child), wide.depth, wide.sah_cost()
+    )
     return layout, wide.order
 
 
 def _cwbvh(tree: Bvh) -> tuple[Layout, IntArray]:
     packed = compress(tree)
     # One more stack entry: while a node's instances are visited, all of its child nodes are on the stack.
-    layout = Layout("cwbvh", {"nodes": packed.nodes}, packed.stack + 1, len(packed.nodes), packed.wide.depth,
-                    packed.wide.sah_cost())
+    layout = Layout(
+        "cwbvh", {"nodes": packed.nodes}, packed.stack + 1, len(packed.nodes), packed.wide.depth, packed.wide.sah_cost()
+    )
     return layout, packed.order
 
 
 def _shift_bvh2(nodes: Records, first_node: int, first_leaf: int) -> None:
-    nodes["left_first"] += np.where(nodes["count"] == 0, np.int32(first_node),
-                                    np.where(nodes["count"] > 0, np.int32(first_leaf), np.int32(0)))
+    nodes["left_first"] += np.where(
+        nodes["count"] == 0, np.int32(first_node), np.where(nodes["count"] > 0, np.int32(first_leaf), np.int32(0))
+    )
 
 
 def _shift_bvh8(nodes: Records, first_node: int, first_leaf: int) -> None:
@@ -86,6 +89,8 @@ def _binary_room(instances: int) -> int:
 
 
 #: Forms by layout.
-FORMS = {"bvh2": UpperLevelLayout(BVH2_NODE, "leaf_triangles", _binary_room, _bvh2, _shift_bvh2),
-         "bvh8": UpperLevelLayout(BVH8_NODE, "packs", _wide_room, _bvh8, _shift_bvh8),
-         "cwbvh": UpperLevelLayout(CWBVH_NODE, "leaf_triangles", _wide_room, _cwbvh, _shift_cwbvh)}
+FORMS = {
+    "bvh2": UpperLevelLayout(BVH2_NODE, "leaf_triangles", _binary_room, _bvh2, _shift_bvh2),
+    "bvh8": UpperLevelLayout(BVH8_NODE, "packs", _wide_room, _bvh8, _shift_bvh8),
+    "cwbvh": UpperLevelLayout(CWBVH_NODE, "leaf_triangles", _wide_room, _cwbvh, _shift_cwbvh),
+}

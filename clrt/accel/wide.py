@@ -76,8 +76,9 @@ class WideBvh:
         _, sphere, count = leaf_fields(self.child[leaf])
         leaves = half_area(self.aabb_min[leaf], self.aabb_max[leaf])
         visits = np.any(self.child != EMPTY, axis=1)
-        return expected_work(np.concatenate([nodes, leaves]),
-                             np.concatenate([visits, intersections(count, sphere, pack)]))
+        return expected_work(
+            np.concatenate([nodes, leaves]), np.concatenate([visits, intersections(count, sphere, pack)])
+        )
 
 
 def leaf_reference(first: IntArray, sphere: BoolArray, count: IntArray) -> IntArray:
@@ -164,5 +165,10 @@ def _wide(tree: Bvh, slots: IntArray) -> WideBvh:
     child = np.full(slots.shape, EMPTY, np.int32)
     child[leaf] = leaf_reference(tree.left_first[nodes], tree.spheres[nodes], tree.count[nodes])
     child[interior] = np.arange(1, 1 + np.count_nonzero(interior))
-    return WideBvh(np.concatenate([tree.aabb_min, nowhere])[slots], np.concatenate([tree.aabb_max, -nowhere])[slots],
-                   child, tree.order, tree.sphere_order)
+    return WideBvh(
+        np.concatenate([tree.aabb_min, nowhere])[slots],
+        np.concatenate([tree.aabb_max, -nowhere])[slots],
+        child,
+        tree.order,
+        tree.sphere_order,
+    )

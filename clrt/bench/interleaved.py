@@ -33,8 +33,16 @@ def race(contestants: dict[str, Contestant], rounds: int = ROUNDS) -> dict[str, 
     medians = {name: [median(each) for each in zip(*seconds)] for name, seconds in taken.items()}
     first = next(iter(contestants))
     per_ray = {name: [value / contestants[name].rays for value in values] for name, values in medians.items()}
-    return {name: {"rays": contestants[name].rays, "seconds": seconds, "cpu_seconds": cpu_seconds,
-                   "mrays": 1e-6 / per_ray[name][0], "ratio": per_ray[name][0] / per_ray[first][0],
-                   "cpu_ratio": per_ray[name][1] / max(per_ray[first][1], 1e-12), "agrees": contestants[name].agrees,
-                   "rounds": taken[name]}
-            for name, (seconds, cpu_seconds) in medians.items()}
+    return {
+        name: {
+            "rays": contestants[name].rays,
+            "seconds": seconds,
+            "cpu_seconds": cpu_seconds,
+            "mrays": 1e-6 / per_ray[name][0],
+            "ratio": per_ray[name][0] / per_ray[first][0],
+            "cpu_ratio": per_ray[name][1] / max(per_ray[first][1], 1e-12),
+            "agrees": contestants[name].agrees,
+            "rounds": taken[name],
+        }
+        for name, (seconds, cpu_seconds) in medians.items()
+    }

@@ -56,7 +56,7 @@ def chi2_test(observed: ArrayLike, expected: ArrayLike, min_expected: float = 5.
     counts, means = _pooled(counts, means, min_expected)
     if means.size < 2:
         raise ValueError(f"too few samples: only {means.size} cells expect {min_expected} or more")
-    return _upper_gamma((means.size - 1) / 2, float(np.sum((counts - means)**2 / means)) / 2)
+    return _upper_gamma((means.size - 1) / 2, float(np.sum((counts - means) ** 2 / means)) / 2)
 
 
 def mean_test(mean: Numbers, variance: Numbers, count: Numbers, expected: Numbers) -> NDArray[np.float64]:
@@ -92,16 +92,19 @@ def _gauss() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return nodes, weights
 
 
-def _pooled(counts: NDArray[np.float64], means: NDArray[np.float64],
-            least: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _pooled(
+    counts: NDArray[np.float64], means: NDArray[np.float64], least: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     order = np.argsort(means, kind="stable")
     counts, means = counts[order], means[order]
     # The pool takes every small cell, then the next larger ones until it is large enough itself.
     size = max(int(np.searchsorted(means, least)), 1)
     while size < means.size and means[:size].sum() < least:
         size += 1
-    return (np.concatenate(([counts[:size].sum()], counts[size:])),
-            np.concatenate(([means[:size].sum()], means[size:])))
+    return (
+        np.concatenate(([counts[:size].sum()], counts[size:])),
+        np.concatenate(([means[:size].sum()], means[size:])),
+    )
 
 
 def _upper_gamma(a: float, x: float) -> float:

@@ -51,8 +51,9 @@ def _check_denormals(device: Device, lanes: int, findings: Findings) -> None:
     for name, operation in (("sum", np.add), ("difference", np.subtract)):
         got, truth, flushed = rows[name].view(np.float32), operation(a, b), operation(_flushed(a), _flushed(b))
         allowed = np.stack([truth, _flushed(truth), flushed, _flushed(flushed)])
-        findings.expect(np.any(got == allowed, axis=0), f"{name} of tiny float{LANES[lanes]}", ("of", a), ("of", b),
-                        ("gave", got))
+        findings.expect(
+            np.any(got == allowed, axis=0), f"{name} of tiny float{LANES[lanes]}", ("of", a), ("of", b), ("gave", got)
+        )
         kept = kept and np.array_equal(got, truth)
     findings.figures[f"denormals of float{LANES[lanes]}"] = "kept" if kept else "flushed"
 

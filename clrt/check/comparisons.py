@@ -29,7 +29,7 @@ def check_comparisons(device: Device, findings: Findings) -> None:
                 findings.same(floats[name], exact(a, b, c), f"{name} of float{LANES[lanes]}", a, b, c)
             for name in ("quotient", "reciprocal", "sqrt"):
                 truth = LIMITS[name][1](a, b, c)
-                clear = ~np.isfinite(truth) | (truth == 0)     # no rounding is involved
+                clear = ~np.isfinite(truth) | (truth == 0)  # no rounding is involved
                 findings.same(floats[name][clear], truth[clear], f"{name} of float{LANES[lanes]}", a[clear], b[clear])
         for name, extreme in (("fmin", np.fmin), ("fmax", np.fmax)):
             truth = extreme(a, b)

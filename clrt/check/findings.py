@@ -37,8 +37,7 @@ class Findings:
         names = [("of", operand) for operand in operands]
         self.expect(right, what, *names, ("gave", got), ("not", exact))
 
-    def at_most(self, limit: float, errors: NDArray[np.float64], what: str, unit: str,
-                *operands: NDArray[Any]) -> None:
+    def at_most(self, limit: float, errors: NDArray[np.float64], what: str, unit: str, *operands: NDArray[Any]) -> None:
         """Record the largest of all `errors` (n,) for `what` as a figure, and a failure if one is above `limit`."""
         figure = f"{what}, {unit}"
         worst = float(np.max(errors, where=np.isfinite(errors), initial=float(self.figures.get(figure, 0.0))))

@@ -63,7 +63,7 @@ def float_rows(device: Device, lanes: int, a: Floats, b: Floats, c: Floats) -> d
     """Return the device's results for (n,) operands, as bits, by operation."""
     padded = np.resize(np.stack([a, b, c], axis=1), (-(-len(a) // 8) * 8, 3))
     rows = CheckProgram(device, "floats", lanes, ROWS).rows("floats", lanes, padded.T)
-    return {name: row[:len(a)] for name, row in rows.items()}
+    return {name: row[: len(a)] for name, row in rows.items()}
 
 
 def operands() -> tuple[Floats, Floats, Floats]:
@@ -75,7 +75,7 @@ def operands() -> tuple[Floats, Floats, Floats]:
     digits, exponents = rng.integers(1 << 23, 1 << 24, (3, COUNT)), rng.integers(-20, 20, (3, COUNT))
     exponents[1] = np.where(i % 2, exponents[1], exponents[0] + rng.integers(-24, 25, COUNT))
     a, b, c = (rng.choice([-1, 1], (3, COUNT)) * digits * 2.0 ** (exponents - 23)).astype(np.float32)
-    b = np.where(i % 8 == 0, np.spacing(a) / 2, b)                               # a + b is halfway between two floats
+    b = np.where(i % 8 == 0, np.spacing(a) / 2, b)  # a + b is halfway between two floats
     odd = (1 + (digits[0] % 4096 | 1) / 4096).astype(np.float32)
-    a, b = np.where(i % 8 == 1, odd, a), np.where(i % 8 == 1, odd, b)            # a·b is
+    a, b = np.where(i % 8 == 1, odd, a), np.where(i % 8 == 1, odd, b)  # a·b is
     return a, b, np.where(i % 3 == 0, -(a * b), c)

@@ -67,7 +67,7 @@ WORDS: dict[str, Operation] = {
     "shifted_bytes": lambda a, b: sum(x << (y & 15) for x, y in zip(octets(a), octets(b))),
     "bytes_to_float": lambda a, b: float_bits(sum(octets(a)) / 4),
     "signed_byte": lambda a, b: (a & 255) - 2 * (a & 128),
-    "float_to_byte": lambda a, b: 64 + (a & 0x7fffff) // (1 << 17),
+    "float_to_byte": lambda a, b: 64 + (a & 0x7FFFFF) // (1 << 17),
 }
 
 
@@ -82,8 +82,14 @@ def check_integers(device: Device, findings: Findings) -> None:
     for lanes in LANES:
         true = 1 if lanes == 1 else -1
         masks = {name: (lambda a, b, compare=compare: true * compare(a, b)) for name, compare in COMPARISONS.items()}
-        _check_rows(CheckProgram(device, "integers", lanes, (*INTEGERS, *masks)), "integers", lanes, INTEGERS | masks,
-                    inputs, findings)
+        _check_rows(
+            CheckProgram(device, "integers", lanes, (*INTEGERS, *masks)),
+            "integers",
+            lanes,
+            INTEGERS | masks,
+            inputs,
+            findings,
+        )
     words = CheckProgram(device, "words", 1, tuple(WORDS))
     _check_rows(words, "words", 1, WORDS, inputs, findings)
     _check_loops(device, findings)
@@ -102,8 +108,14 @@ def _check_loops(device: Device, findings: Findings) -> None:
         findings.failures.append(f"a loop of {TURNS} iterations ends after {turns}")
 
 
-def _check_rows(probe: CheckProgram, kernel: str, lanes: int, operations: Mapping[str, Operation],
-                inputs: NDArray[np.uint32], findings: Findings) -> None:
+def _check_rows(
+    probe: CheckProgram,
+    kernel: str,
+    lanes: int,
+    operations: Mapping[str, Operation],
+    inputs: NDArray[np.uint32],
+    findings: Findings,
+) -> None:
     a, b = inputs
     for name, row in probe.rows(kernel, lanes, inputs).items():
         truth = [operations[name](x, y) % (1 << 32) for x, y in zip(a.tolist(), b.tolist())]

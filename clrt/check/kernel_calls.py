@@ -20,8 +20,11 @@ FILES = ("floats", "integers", "words", "masks", "memory", "samples")
 def source(file: str, lanes: int, rows: Iterable[str] = ()) -> str:
     """Return the program of one of FILES, whose kernels number their rows of results in the order of `rows`."""
     values = {"LANES": lanes} | {f"ROW_{row}": number for number, row in enumerate(rows)}
-    return compose("\n".join([defines(values), typedefs({"Pixel": PIXEL})]), f"check/{file}.cl",
-                   {"SAMPLER": ["sampler/independent.cl"]})
+    return compose(
+        "\n".join([defines(values), typedefs({"Pixel": PIXEL})]),
+        f"check/{file}.cl",
+        {"SAMPLER": ["sampler/independent.cl"]},
+    )
 
 
 class CheckProgram:
@@ -31,8 +34,9 @@ class CheckProgram:
         self.work = DataParallel(device, source(file, lanes, rows))
         self._rows = rows
 
-    def run(self, kernel: str, count: int, *arguments: NDArray[Any] | int,
-            out: Sequence[tuple[DTypeLike, int]]) -> list[NDArray[Any]]:
+    def run(
+        self, kernel: str, count: int, *arguments: NDArray[Any] | int, out: Sequence[tuple[DTypeLike, int]]
+    ) -> list[NDArray[Any]]:
         """Run `kernel` over `count` items; return its output arrays, zero before, with the dtypes and sizes in `out`.
 
         The kernel's parameters are count and block, then `arguments`, then the output arrays.
@@ -45,5 +49,5 @@ class CheckProgram:
     def rows(self, kernel: str, lanes: int, inputs: NDArray[Any]) -> dict[str, NDArray[np.uint32]]:
         """Return the (n,) results of `kernel` by row name, as bits; inputs: (k, n), n a multiple of `lanes`."""
         n = inputs.shape[1]
-        out, = self.run(kernel, n // lanes, inputs, out=[(np.uint32, len(self._rows) * n)])
+        (out,) = self.run(kernel, n // lanes, inputs, out=[(np.uint32, len(self._rows) * n)])
         return dict(zip(self._rows, out.reshape(-1, n)))

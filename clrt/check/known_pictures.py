@@ -31,10 +31,17 @@ def check_furnace(device: Device, findings: Findings) -> None:
         for column, (kind, color) in enumerate(zip((Diffuse, Mirror), colors)):
             corner = (0.5 * column - 0.5, -0.5 * row, 0.0)
             meshes.append(_quad(corner, (0.5, 0.0, 0.0), (0.0, 0.5, 0.0), kind(color=color)))
-            truth[quarter * (row + 1):quarter * (row + 2), quarter * (column + 1):quarter * (column + 2)] = color
-    film = _film(device, findings, Scene(
-        meshes=meshes, environment=Environment(color=(1.0, 1.0, 1.0)),
-        camera=Camera(position=(0.0, 0.0, 1.0), look_at=(0.0, 0.0, 0.0), fov_degrees=90)), spp=16)
+            truth[quarter * (row + 1) : quarter * (row + 2), quarter * (column + 1) : quarter * (column + 2)] = color
+    film = _film(
+        device,
+        findings,
+        Scene(
+            meshes=meshes,
+            environment=Environment(color=(1.0, 1.0, 1.0)),
+            camera=Camera(position=(0.0, 0.0, 1.0), look_at=(0.0, 0.0, 0.0), fov_degrees=90),
+        ),
+        spp=16,
+    )
     findings.same(film.mean.astype(np.float32).ravel(), truth.ravel(), "colour under a white sky")
 
 
@@ -44,22 +51,40 @@ def check_lamp(device: Device, findings: Findings) -> None:
     material = Diffuse(color=color)
     floor = _quad((-9.0, 0.0, 9.0), (18.0, 0.0, 0.0), (0.0, 0.0, -18.0), material)
     wall = _quad((0.0, 0.0, 9.0), (0.0, 3.5, 0.0), (0.0, 0.0, -18.0), material)
-    film = _film(device, findings, Scene(
-        meshes=[floor, wall], lights=[PointLight(position=(x, height, z), intensity=intensity)],
-        camera=Camera(position=(0.0, 4.0, 0.0), look_at=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0),
-                      fov_degrees=float(np.degrees(2 * np.arctan(1 / 16))))), spp=16, max_depth=2)
-    edges = np.linspace(-0.25, 0.25, SIZE + 1)    # of the pixels, on the floor, along x and z
+    film = _film(
+        device,
+        findings,
+        Scene(
+            meshes=[floor, wall],
+            lights=[PointLight(position=(x, height, z), intensity=intensity)],
+            camera=Camera(
+                position=(0.0, 4.0, 0.0),
+                look_at=(0.0, 0.0, 0.0),
+                up=(0.0, 0.0, -1.0),
+                fov_degrees=float(np.degrees(2 * np.arctan(1 / 16))),
+            ),
+        ),
+        spp=16,
+        max_depth=2,
+    )
+    edges = np.linspace(-0.25, 0.25, SIZE + 1)  # of the pixels, on the floor, along x and z
     nearest, farthest = [], []
     for lamp in (z, x):
         low, high = edges[:-1] - lamp, edges[1:] - lamp
         nearest.append(np.maximum(np.maximum(low, -high), 0))
         farthest.append(np.maximum(np.abs(low), np.abs(high)))
     light = np.multiply(color, intensity) / np.pi * (edges[:-1, None] >= 0)
-    least, most = ((height / (height**2 + np.add.outer(b**2, a**2)) ** 1.5)[..., None] * light
-                   for b, a in (farthest, nearest))
+    least, most = (
+        (height / (height**2 + np.add.outer(b**2, a**2)) ** 1.5)[..., None] * light for b, a in (farthest, nearest)
+    )
     inside = (least * (1 - 1e-5) <= film.mean) & (film.mean <= most * (1 + 1e-5))
-    findings.expect(inside.ravel(), "light of a point light on a floor", ("gave", film.mean.ravel()),
-                    ("not between", least.ravel()), ("and", most.ravel()))
+    findings.expect(
+        inside.ravel(),
+        "light of a point light on a floor",
+        ("gave", film.mean.ravel()),
+        ("not between", least.ravel()),
+        ("and", most.ravel()),
+    )
 
 
 def check_ball(device: Device, findings: Findings) -> None:
@@ -71,16 +96,27 @@ def check_ball(device: Device, findings: Findings) -> None:
     color, shine, sun, radius = (0.8, 0.5, 0.2), (0.1, 0.2, 0.3), (3.0, 2.0, 1.0), 0.7
     center, towards, distance = np.array([0.3, -0.2, 0.1]), np.array([0.36, 0.48, 0.8]), 7.0
     x, y, z = (center + distance * towards).tolist()
-    corner = np.arcsin(0.3 * radius / distance)    # angle of the image's corner from the view direction
-    film = _film(device, findings, Scene(
-        spheres=[Sphere(center=(0.3, -0.2, 0.1), radius=radius, material=Diffuse(color=color, emission=shine))],
-        lights=[DirectionalLight(direction=(-0.36, -0.48, -0.8), irradiance=sun)],
-        camera=Camera(position=(x, y, z), look_at=(0.3, -0.2, 0.1),
-                      fov_degrees=float(np.degrees(2 * np.arctan(np.tan(corner) / np.sqrt(2)))))), spp=16, max_depth=2)
+    corner = np.arcsin(0.3 * radius / distance)  # angle of the image's corner from the view direction
+    film = _film(
+        device,
+        findings,
+        Scene(
+            spheres=[Sphere(center=(0.3, -0.2, 0.1), radius=radius, material=Diffuse(color=color, emission=shine))],
+            lights=[DirectionalLight(direction=(-0.36, -0.48, -0.8), irradiance=sun)],
+            camera=Camera(
+                position=(x, y, z),
+                look_at=(0.3, -0.2, 0.1),
+                fov_degrees=float(np.degrees(2 * np.arctan(np.tan(corner) / np.sqrt(2)))),
+            ),
+        ),
+        spp=16,
+        max_depth=2,
+    )
     light, least_cosine = np.multiply(color, sun) / np.pi, np.cos(np.arcsin(0.3) - corner)
     inside = (shine + least_cosine * light <= film.mean * (1 + 1e-5)) & (film.mean <= (shine + light) * (1 + 1e-5))
-    findings.expect(inside.reshape(-1, 3).all(axis=1), "light of the sun on an emissive sphere",
-                    ("gave", film.mean.reshape(-1, 3)))
+    findings.expect(
+        inside.reshape(-1, 3).all(axis=1), "light of the sun on an emissive sphere", ("gave", film.mean.reshape(-1, 3))
+    )
 
 
 def check_room(device: Device, findings: Findings) -> None:
@@ -95,11 +131,21 @@ def check_room(device: Device, findings: Findings) -> None:
     for axis in range(3):
         n, a, b = np.roll(np.eye(3), -axis, axis=0)
         walls += [_quad(-n - a - b, 2 * a, 2 * b, diffuse), _quad(n - a - b, 2 * b, 2 * a, diffuse)]
-    film = _film(device, findings, Scene(
-        meshes=walls, spheres=[Sphere(center=(-0.4, -0.3, -0.4), radius=0.4, material=mirror),
-                               Sphere(center=(0.5, -0.6, -0.2), radius=0.3, material=diffuse)],
-        camera=Camera(position=(0.1, 0.2, 0.9), look_at=(0.0, -0.1, -1.0), fov_degrees=70)),
-        spp=256, max_depth=DEPTH, size=SIZE if effort(device) * 256 >= 2 else SIZE // 2)
+    film = _film(
+        device,
+        findings,
+        Scene(
+            meshes=walls,
+            spheres=[
+                Sphere(center=(-0.4, -0.3, -0.4), radius=0.4, material=mirror),
+                Sphere(center=(0.5, -0.6, -0.2), radius=0.3, material=diffuse),
+            ],
+            camera=Camera(position=(0.1, 0.2, 0.9), look_at=(0.0, -0.1, -1.0), fov_degrees=70),
+        ),
+        spp=256,
+        max_depth=DEPTH,
+        size=SIZE if effort(device) * 256 >= 2 else SIZE // 2,
+    )
     truth = shine * (1 - share**DEPTH) / (1 - share)
     count, mean = film.samples, film.mean.mean(axis=(0, 1))
     squares = (film.pixels["square"].astype(np.float64) + film.pixels["square_error"]).sum(axis=(0, 1)) / count

@@ -42,8 +42,10 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
                 failures.append(f"{part}: {told_end(child.returncode)}{last_line(errors)}")
         except (Empty, subprocess.TimeoutExpired):
             if limit < LIMIT and not failures:
-                raise DeviceError(f"{info.name} cannot be checked: {part} did not finish in {limit:g} s; raise "
-                                  f"--limit ({LIMIT:g} is the default)") from None
+                raise DeviceError(
+                    f"{info.name} cannot be checked: {part} did not finish in {limit:g} s; raise "
+                    f"--limit ({LIMIT:g} is the default)"
+                ) from None
             failures.append(f"{part}: it did not finish in {limit:g} s")
         finally:
             end_child(child)

@@ -19,9 +19,15 @@ def check_random_numbers(device: Device, findings: Findings) -> None:
     """Check that the device's numbers equal those of the same hash in numpy, and lie in [0, 1)."""
     rng, probe = np.random.default_rng(5), CheckProgram(device, "samples", device.lanes)
     index = rng.integers(0, 1 << 32, (2, COUNT), np.uint32)
-    for seed, dimension in ((0, 0), (7, 3), (0xffffffff, 1000)):
-        bits, units = probe.run("numbers", COUNT // device.lanes, index, seed, dimension,
-                                out=[(np.uint32, 2 * COUNT), (np.float32, 2 * COUNT)])
+    for seed, dimension in ((0, 0), (7, 3), (0xFFFFFFFF, 1000)):
+        bits, units = probe.run(
+            "numbers",
+            COUNT // device.lanes,
+            index,
+            seed,
+            dimension,
+            out=[(np.uint32, 2 * COUNT), (np.float32, 2 * COUNT)],
+        )
         truth = np.concatenate(pcg4d(index[0], index[1], np.uint32(dimension), np.uint32(seed)))
         where = np.tile(index, 2)
         findings.same(bits, truth, "random bits", *where)
@@ -53,13 +59,21 @@ def check_sums(device: Device, findings: Findings) -> None:
     kept = rng.random(samples.shape) < 63 / 64
     others = rng.choice(np.array([np.nan, np.inf, -np.inf, 2e31], np.float32), samples.shape)
     sums, counts = CheckProgram(device, "samples", device.lanes).run(
-        "sums", count // device.lanes, np.where(kept, samples, others).astype(np.float32), SAMPLES,
-        out=[(np.float32, 4 * count), (np.uint32, 2 * count)])
+        "sums",
+        count // device.lanes,
+        np.where(kept, samples, others).astype(np.float32),
+        SAMPLES,
+        out=[(np.float32, 4 * count), (np.uint32, 2 * count)],
+    )
     counted = np.concatenate([kept.sum(axis=0), (~kept).sum(axis=0)])
     findings.same(counts, counted, "samples kept, and samples dropped")
     pairs = sums.reshape(2, 2, count).astype(np.float64)
     for name, (total, error), values in zip(("sum", "sum of squares"), pairs, (samples, samples**2)):
-        truth = np.where(kept, values, 0).sum(axis=0)                 # integers below 2^48, so exact
-        findings.same(total + error, truth.astype(np.float64), name)   # exact in float64, too
-        findings.expect(np.abs(error) <= np.spacing(total.astype(np.float32)) / 2, f"error kept with the {name}",
-                        ("of", total), ("is", error))
+        truth = np.where(kept, values, 0).sum(axis=0)  # integers below 2^48, so exact
+        findings.same(total + error, truth.astype(np.float64), name)  # exact in float64, too
+        findings.expect(
+            np.abs(error) <= np.spacing(total.astype(np.float32)) / 2,
+            f"error kept with the {name}",
+            ("of", total),
+            ("is", error),
+        )

@@ -102,7 +102,7 @@ def meet_planes(star: StarMesh, origins: Integers, directions: Integers) -> tupl
         t = (np.sum(normals * p0, axis=1) - origins @ normals.T) / facing
         moments = np.cross(origins, directions)
         least = np.full(t.shape, np.inf)
-        for a, b in ((p0, p1), (p1, p2), (p2, p0)):       # from the volume that the ray spans with the opposite edge
+        for a, b in ((p0, p1), (p1, p2), (p2, p0)):  # from the volume that the ray spans with the opposite edge
             volume = directions @ np.cross(a, b).T + moments @ (b - a).T
             least = np.minimum(least, volume / facing)
     lengths = np.linalg.norm(directions, axis=1)[:, None] * np.linalg.norm(normals, axis=1)

@@ -17,7 +17,7 @@ def check_memory(device: Device, findings: Findings) -> None:
     """Check that copies are exact, that atomics lose no update, and that prefix sums are correct."""
     rng, probe = np.random.default_rng(4), CheckProgram(device, "memory")
     floats = rng.random(17 * COUNT, np.float32)
-    moved, = probe.run("move", COUNT, floats, out=[(np.float32, floats.size)])
+    (moved,) = probe.run("move", COUNT, floats, out=[(np.float32, floats.size)])
     findings.same(moved, floats, "numbers moved by vectors")
 
     numbers = rng.integers(0, 1 << 32, COUNT, np.uint32)

@@ -28,7 +28,7 @@ class StatusLine:
 
     def show(self, parts: Iterable[str]) -> None:
         """Replace the line's text by as many of the parts as fit, the first ones first."""
-        room = columns(self._terminal) - 1      # at the last column some terminals wrap
+        room = columns(self._terminal) - 1  # at the last column some terminals wrap
         text = fitted(parts, room)
         self._put("\r" + text.ljust(min(self._shown, room)))
         self._shown = len(text)
@@ -46,7 +46,7 @@ class StatusLine:
         self._shown = 0
 
     def _put(self, text: str) -> None:
-        with suppress(OSError):     # the terminal may be closed
+        with suppress(OSError):  # the terminal may be closed
             self._terminal.write(text)
             self._terminal.flush()
 
@@ -93,8 +93,16 @@ class BarProgress(Progress):
         samples, seconds, rate, *errors = figures(state, self._pace.rate)
         percent, told = goal.percent(state).strip(), [samples, *errors, seconds, rate, describe_workers(self._workers)]
         self._ended = [self._frame + percent, *told]
-        self._line.show([f"{self._frame}{PHASES['render']}", percent, bar(goal.done(state)),
-                         "" if left is None else f"{left:.0f} s left", *told, self._where])
+        self._line.show(
+            [
+                f"{self._frame}{PHASES['render']}",
+                percent,
+                bar(goal.done(state)),
+                "" if left is None else f"{left:.0f} s left",
+                *told,
+                self._where,
+            ]
+        )
 
     def bands(self, done: int, count: int) -> None:
         self._line.show([PHASES["render"], f"{done} of {count} bands", bar(done / count)])
@@ -106,8 +114,9 @@ class BarProgress(Progress):
             sys.stdout = cast(TextIO, _Other(stdout, self._line))
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._line.erase()
         sys.stdout, sys.stderr = self._streams
 

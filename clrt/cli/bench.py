@@ -27,7 +27,20 @@ def command() -> None:
     mitsuba-data, render-fidelity, numerics, theses, farm."""
 
 
-for each in (rays_command, build_command, hits_command, peers_command, converge_command, agree_command,
-             combinations_command, floor_command, blender_command, mitsuba_data_command, render_fidelity_command,
-             numerics_command, theses_command, farm_command):
+for each in (
+    rays_command,
+    build_command,
+    hits_command,
+    peers_command,
+    converge_command,
+    agree_command,
+    combinations_command,
+    floor_command,
+    blender_command,
+    mitsuba_data_command,
+    render_fidelity_command,
+    numerics_command,
+    theses_command,
+    farm_command,
+):
     command.add_command(each)

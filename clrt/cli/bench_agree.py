@@ -21,8 +21,15 @@ from .option_types import Size
 @click.option("--seeds", type=click.IntRange(min=2), default=16, show_default=True, help="Images per renderer.")
 @click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @figures_options
-def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth: int | None, spp: int, seeds: int,
-                  device: str | None, json_file: Path | None) -> None:
+def agree_command(
+    scenes: tuple[Path, ...],
+    size: tuple[int, int] | None,
+    depth: int | None,
+    spp: int,
+    seeds: int,
+    device: str | None,
+    json_file: Path | None,
+) -> None:
     """Test whether clrt and Mitsuba (pip install mitsuba) render the same image of each SCENE.
 
     The means of each block of 16 x 16 pixels are compared, given their spread over the seeds. The exit code is 1 if a
@@ -45,15 +52,20 @@ def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth:
         raise SystemExit(1)
 
 
-HEAD = [f"{'':22}{'pixels':>10}  {'mean over Mitsuba’s, ± standard error':48}{'blocks':>7}{'noise':>9}{'most':>9}"
-        f"{'largest':>9}{'p':>8}  agree",
-        "  noise, most: median and maximum standard error of a block's relative difference; largest: of these",
-        "  differences; p: p-value of the least likely block and channel, corrected for multiple tests"]
+HEAD = [
+    f"{'':22}{'pixels':>10}  {'mean over Mitsuba’s, ± standard error':48}{'blocks':>7}{'noise':>9}{'most':>9}"
+    f"{'largest':>9}{'p':>8}  agree",
+    "  noise, most: median and maximum standard error of a block's relative difference; largest: of these",
+    "  differences; p: p-value of the least likely block and channel, corrected for multiple tests",
+]
 
 
 def agreement_line(result: Mapping[str, Any]) -> str:
     """Return the table row of a result of `agreement`."""
     means = " ".join(f"{ratio:.5f}±{error:.5f}" for ratio, error in zip(result["mean_ratio"], result["mean_error"]))
-    return (f"{result['scene']:22}{'x'.join(map(str, result['size'])):>10}  {means:48}{result['blocks']:7}"
-            + "".join(f"{value:9.3%}" for value in (*result["noise"], result["difference"]))
-            + f"{result['p']:8.2g}  " + ("yes" if result["agree"] else f"no: {result['rejected']} blocks differ"))
+    return (
+        f"{result['scene']:22}{'x'.join(map(str, result['size'])):>10}  {means:48}{result['blocks']:7}"
+        + "".join(f"{value:9.3%}" for value in (*result["noise"], result["difference"]))
+        + f"{result['p']:8.2g}  "
+        + ("yes" if result["agree"] else f"no: {result['rejected']} blocks differ")
+    )

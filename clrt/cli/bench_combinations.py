@@ -14,28 +14,55 @@ from .bench_files import figures_options, write_figures
 if TYPE_CHECKING:
     from ..bench.combinations.combinations import Verdict
 
-PROPERTIES = ("additivity", "strategies", "choice", "integrators", "brightness", "similarity", "partition",
-              "bystanders")
-HEADER = (f"{'':16}{'scenes':>8}{'off':>6}{'2 rounds':>10}{'3 rounds':>10}{'4 rounds':>10}{'least p':>10}{'noise':>9}"
-          f"{'dropped':>9}")
+PROPERTIES = (
+    "additivity",
+    "strategies",
+    "choice",
+    "integrators",
+    "brightness",
+    "similarity",
+    "partition",
+    "bystanders",
+)
+HEADER = (
+    f"{'':16}{'scenes':>8}{'off':>6}{'2 rounds':>10}{'3 rounds':>10}{'4 rounds':>10}{'least p':>10}{'noise':>9}"
+    f"{'dropped':>9}"
+)
 LEGEND = """  off: violations; rounds: suspicious scenes are rendered again with new seeds and more samples
   least p: smallest p-value of a scene's last round, corrected; dropped: samples that were not finite
   noise: median standard error of the relative difference of whole images"""
 
 
 @click.command("combinations")
-@click.option("--property", "names", multiple=True, type=click.Choice(PROPERTIES),
-              help="Test this property only; may be repeated. Default: all.")
+@click.option(
+    "--property",
+    "names",
+    multiple=True,
+    type=click.Choice(PROPERTIES),
+    help="Test this property only; may be repeated. Default: all.",
+)
 @click.option("--scenes", type=click.IntRange(min=1), help="Number of random scenes; default: 500, with --quick 4.")
 @click.option("--first", default=0, show_default=True, type=click.IntRange(min=0), help="Number of the first scene.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0, 2**32 - 1), help="Seed of the scenes.")
-@click.option("--keep", type=click.Path(path_type=Path), metavar="DIR",
-              help="Save the scenes that violate a property there, as scene files.")
+@click.option(
+    "--keep",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Save the scenes that violate a property there, as scene files.",
+)
 @click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @click.option("--quick", is_flag=True, help="Test few scenes.")
 @figures_options
-def combinations_command(names: tuple[str, ...], scenes: int | None, first: int, seed: int, keep: Path | None,
-                         device: str | None, quick: bool, json_file: Path | None) -> None:
+def combinations_command(
+    names: tuple[str, ...],
+    scenes: int | None,
+    first: int,
+    seed: int,
+    keep: Path | None,
+    device: str | None,
+    quick: bool,
+    json_file: Path | None,
+) -> None:
     """Test identities of rendered images on random scenes.
 
     The scenes combine all materials, lights, cameras and textures at random. Properties: the image with all lights is
@@ -66,19 +93,30 @@ def combinations_command(names: tuple[str, ...], scenes: int | None, first: int,
         results += found
     click.echo(LEGEND)
     off = [each.is_off(count * len(chosen)) for each in results]
-    write_figures(json_file, {"seed": seed, "first": first, "scenes": count, "verdicts": [
-        asdict(each) | {"off": wrong} for each, wrong in zip(results, off)]})
+    write_figures(
+        json_file,
+        {
+            "seed": seed,
+            "first": first,
+            "scenes": count,
+            "verdicts": [asdict(each) | {"off": wrong} for each, wrong in zip(results, off)],
+        },
+    )
     if any(off):
         raise SystemExit(1)
 
 
 def _line(each: Verdict) -> str:
-    return (f"  off: {each.property}, scene {each.number}: {each.side}: image {each.mean - 1:+.2%} ± {each.noise:.2%}"
-            f", one block {each.difference:+.2%}, p {each.p:.1e}")
+    return (
+        f"  off: {each.property}, scene {each.number}: {each.side}: image {each.mean - 1:+.2%} ± {each.noise:.2%}"
+        f", one block {each.difference:+.2%}, p {each.p:.1e}"
+    )
 
 
 def _row(name: str, found: list[Verdict], tests: int) -> str:
     longer = "".join(f"{sum(each.rounds >= rounds for each in found):10}" for rounds in (2, 3, 4))
-    return (f"{name:16}{len(found):8}{sum(each.is_off(tests) for each in found):6}{longer}"
-            f"{min(each.p for each in found):10.1e}{median(each.noise for each in found):9.2%}"
-            f"{sum(each.dropped for each in found):9}")
+    return (
+        f"{name:16}{len(found):8}{sum(each.is_off(tests) for each in found):6}{longer}"
+        f"{min(each.p for each in found):10.1e}{median(each.noise for each in found):9.2%}"
+        f"{sum(each.dropped for each in found):9}"
+    )

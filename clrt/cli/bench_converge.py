@@ -19,36 +19,82 @@ if TYPE_CHECKING:
     from ..scene.render_settings import Integrator
 
 #: The configurations of contestants.py, where the names start with "clrt, ".
-NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "paths in lanes",
-         "unplanned"]
+NAMES = [
+    "clrt",
+    "stratified",
+    "independent",
+    "lanes 1",
+    "bvh2",
+    "adaptive",
+    "lanes 8",
+    "lanes 16",
+    "paths in lanes",
+    "unplanned",
+]
 INTEGRATORS = ["path", "direct", "local", "raster"]
 
 
 @click.command("converge")
 @click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SCENE...")
-@click.option("--choice", "names", multiple=True, type=click.Choice(NAMES),
-              help="Configuration to compare with the first; may be repeated. Default: up to bvh2.")
-@click.option("--integrator", "integrators", multiple=True, type=click.Choice(INTEGRATORS),
-              help="Integrator instead of the scene's; may be repeated. Each has its own reference.")
+@click.option(
+    "--choice",
+    "names",
+    multiple=True,
+    type=click.Choice(NAMES),
+    help="Configuration to compare with the first; may be repeated. Default: up to bvh2.",
+)
+@click.option(
+    "--integrator",
+    "integrators",
+    multiple=True,
+    type=click.Choice(INTEGRATORS),
+    help="Integrator instead of the scene's; may be repeated. Each has its own reference.",
+)
 @click.option("--peers", is_flag=True, help="Also compare Mitsuba and Cycles, if installed.")
-@click.option("--device", "selectors", multiple=True, metavar="SEL",
-              help="Device to use; see `clrt devices`. May be repeated.")
+@click.option(
+    "--device", "selectors", multiple=True, metavar="SEL", help="Device to use; see `clrt devices`. May be repeated."
+)
 @click.option("--size", type=Size(), help="Image size in pixels.")
-@click.option("--time", "seconds", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
-              help="Longest time per image; default: 10, with --quick 1, with --spp unlimited.")
-@click.option("--spp", multiple=True, type=click.IntRange(min=1),
-              help="Samples per pixel instead of 1, 2, 4, ...; may be repeated.")
+@click.option(
+    "--time",
+    "seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="SECONDS",
+    help="Longest time per image; default: 10, with --quick 1, with --spp unlimited.",
+)
+@click.option(
+    "--spp",
+    multiple=True,
+    type=click.IntRange(min=1),
+    help="Samples per pixel instead of 1, 2, 4, ...; may be repeated.",
+)
 @click.option("--seeds", type=click.IntRange(min=1), help="Images of each kind; default: 5, with --quick 3.")
-@click.option("--reference", type=click.Path(path_type=Path), metavar="FILE",
-              help="Image to measure the error by, taken as exact; for one SCENE. Default: rendered and cached.")
-@click.option("--reference-spp", type=click.IntRange(min=2),
-              help="Samples per pixel of the reference; default: 4096, with --quick 256.")
+@click.option(
+    "--reference",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Image to measure the error by, taken as exact; for one SCENE. Default: rendered and cached.",
+)
+@click.option(
+    "--reference-spp",
+    type=click.IntRange(min=2),
+    help="Samples per pixel of the reference; default: 4096, with --quick 256.",
+)
 @click.option("--quick", is_flag=True, help="Use fewer seeds and a noisier reference.")
 @figures_options
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Plot error against time there.")
-def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrators: tuple[Integrator, ...], peers: bool,
-                     selectors: tuple[str, ...], size: tuple[int, int] | None, json_file: Path | None,
-                     plot: Path | None, reference: Path | None, **asked: Any) -> None:
+def converge_command(
+    scenes: tuple[Path, ...],
+    names: tuple[str, ...],
+    integrators: tuple[Integrator, ...],
+    peers: bool,
+    selectors: tuple[str, ...],
+    size: tuple[int, int] | None,
+    json_file: Path | None,
+    plot: Path | None,
+    reference: Path | None,
+    **asked: Any,
+) -> None:
     """Measure how fast images of each SCENE converge to a reference, which is rendered once and cached, or to the
     image that --reference names.
 
@@ -73,19 +119,30 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     if size is not None:
         loaded = [replace(scene, render=replace(scene.render, size=size)) for scene in loaded]
     if integrators:
-        loaded = [replace(scene, name=f"{scene.name}, {name}", render=replace(scene.render, integrator=name))
-                  for scene in loaded for name in integrators]
+        loaded = [
+            replace(scene, name=f"{scene.name}, {name}", render=replace(scene.render, integrator=name))
+            for scene in loaded
+            for name in integrators
+        ]
     given = None
     if reference is not None:
         if len(loaded) > 1 or asked["reference_spp"]:
-            raise UsageError(f"{reference}: is the reference of one image; name one SCENE, at most one --integrator, "
-                             "and leave out --reference-spp")
+            raise UsageError(
+                f"{reference}: is the reference of one image; name one SCENE, at most one --integrator, "
+                "and leave out --reference-spp"
+            )
         given = Reference.exact(read_reference(reference, loaded[0].render.size))
     chosen = [name if name == "clrt" else f"clrt, {name}" for name in names] or list(CHOICES)
     results = []
     for result in measure_convergence(
-            loaded, [device.index for device in devices], _effort(**asked), peers=peers, given=given,
-            choices={name: (CHOICES | MORE_CHOICES)[name] for name in chosen}, say=partial(click.echo, err=True)):
+        loaded,
+        [device.index for device in devices],
+        _effort(**asked),
+        peers=peers,
+        given=given,
+        choices={name: (CHOICES | MORE_CHOICES)[name] for name in chosen},
+        say=partial(click.echo, err=True),
+    ):
         click.echo("\n".join(scene_lines(result, all(device.type == "cpu" for device in devices))) + "\n")
         results.append(result)
     told = calibrations(results)
@@ -96,11 +153,16 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
         click.echo(str(plot_convergence(plot, results, named)))
 
 
-def _effort(quick: bool, seconds: float | None, spp: tuple[int, ...], seeds: int | None,
-            reference_spp: int | None) -> Effort:
+def _effort(
+    quick: bool, seconds: float | None, spp: tuple[int, ...], seeds: int | None, reference_spp: int | None
+) -> Effort:
     from ..bench.convergence.converge import QUICK, Effort
 
     usual = QUICK if quick else Effort()
-    return Effort(seconds=seconds or (inf if spp else usual.seconds), seeds=seeds or usual.seeds, steps=usual.steps,
-                  step_spp=ceil(reference_spp / usual.steps) if reference_spp else usual.step_spp,
-                  spp=sorted(set(spp)) or usual.spp)
+    return Effort(
+        seconds=seconds or (inf if spp else usual.seconds),
+        seeds=seeds or usual.seeds,
+        steps=usual.steps,
+        step_spp=ceil(reference_spp / usual.steps) if reference_spp else usual.step_spp,
+        spp=sorted(set(spp)) or usual.spp,
+    )

@@ -16,20 +16,47 @@ SCENES = Path(__file__).parents[2] / "scenes"
 
 @click.command("farm")
 @click.argument("trials", nargs=-1, type=click.Choice(TRIALS))
-@click.option("--scene", "scenes", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
-              help="Scene file; may be repeated. Default: cornell, glass and materials in a clone of the repository.")
+@click.option(
+    "--scene",
+    "scenes",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Scene file; may be repeated. Default: cornell, glass and materials in a clone of the repository.",
+)
 @click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; default: 64, for kills 1024, for huge 1.")
 @click.option("--every", default=4.0, show_default=True, metavar="SECONDS", help="kills: time between kills.")
-@click.option("--workers", default=64, show_default=True, type=click.IntRange(min=1),
-              help="overhead: number of workers, which only sleep; the client's memory is measured.")
+@click.option(
+    "--workers",
+    default=64,
+    show_default=True,
+    type=click.IntRange(min=1),
+    help="overhead: number of workers, which only sleep; the client's memory is measured.",
+)
 @click.option("--seconds", default=300.0, show_default=True, help="overhead: duration of the work itself.")
 @click.option("--size", type=Size(), default="16384x16384", show_default=True, help="huge: image size.")
-@click.option("--out", type=click.Path(path_type=Path), default="huge.exr", show_default=True, metavar="FILE",
-              help="huge: image file to write.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default="huge.exr",
+    show_default=True,
+    metavar="FILE",
+    help="huge: image file to write.",
+)
 @click.option("--quick", is_flag=True, help="Use small images and less of everything.")
 @figures_options
-def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | None, every: float, workers: int,
-                 seconds: float, size: tuple[int, int], out: Path, quick: bool, json_file: Path | None) -> None:
+def farm_command(
+    trials: tuple[str, ...],
+    scenes: tuple[Path, ...],
+    spp: int | None,
+    every: float,
+    workers: int,
+    seconds: float,
+    size: tuple[int, int],
+    out: Path,
+    quick: bool,
+    json_file: Path | None,
+) -> None:
     """Test a render farm on this machine: whether its image equals that of one process bit for bit, even if workers
     are killed; how well it scales to 64 workers; how much memory the client needs for a 16k x 16k image."""
     from ..farm import trials as trial
@@ -48,8 +75,11 @@ def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | N
 
     def told(row: dict[str, Any]) -> None:
         rows.append(row)
-        click.echo("  ".join(f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
-                             for name, value in row.items()))
+        click.echo(
+            "  ".join(
+                f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}" for name, value in row.items()
+            )
+        )
 
     for name in trials or TRIALS:
         match name:

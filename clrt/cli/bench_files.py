@@ -21,14 +21,22 @@ FOLDERS = ("pictures", "keep")
 def figures_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add --json and --force to an experiment. Its output files are checked before it starts, as in `clrt render`, and
     its folders are created."""
+
     @wraps(command)
     def checked(force: bool, **given: Any) -> None:
         _check(given, force)
         command(**given)
 
-    for option in (click.option("--force", is_flag=True, help="Replace files that are read-only."),
-                   click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE",
-                                help="Write the results to this file.")):
+    for option in (
+        click.option("--force", is_flag=True, help="Replace files that are read-only."),
+        click.option(
+            "--json",
+            "json_file",
+            type=click.Path(path_type=Path),
+            metavar="FILE",
+            help="Write the results to this file.",
+        ),
+    ):
         checked = option(checked)
     return checked
 
@@ -53,13 +61,18 @@ def _check(given: Mapping[str, Any], force: bool) -> None:
     from ..output.atomic_files import check_target, check_unprotected, make_folder
     from ..output.error_plots import check_plot
 
-    taken = {os.path.realpath(path): "an input" for name, value in given.items() if name not in {*FILES, *FOLDERS}
-             for path in _paths(value)}
+    taken = {
+        os.path.realpath(path): "an input"
+        for name, value in given.items()
+        if name not in {*FILES, *FOLDERS}
+        for path in _paths(value)
+    }
     for name, option in FILES.items():
         for path in _paths(given.get(name)):
             if before := taken.get(real := os.path.realpath(path)):
-                raise UsageError(f"{path}: is both {before} and {option}, one of which would be lost; choose another "
-                                 "file")
+                raise UsageError(
+                    f"{path}: is both {before} and {option}, one of which would be lost; choose another file"
+                )
             taken[real] = option
             (check_plot if name == "plot" else check_target)(path)
             check_unprotected(path, force)

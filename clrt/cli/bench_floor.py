@@ -12,8 +12,13 @@ from .bench_files import figures_options, write_figures
 
 
 @click.command("floor")
-@click.option("--light", "chosen", multiple=True, metavar="NAME",
-              help="Test only this light: sun above, sun at 60°, point, HDRI, low lamp; may be repeated.")
+@click.option(
+    "--light",
+    "chosen",
+    multiple=True,
+    metavar="NAME",
+    help="Test only this light: sun above, sun at 60°, point, HDRI, low lamp; may be repeated.",
+)
 @click.option("--spp", type=click.IntRange(min=1), default=1024, show_default=True, help="Samples per pixel.")
 @click.option("--seeds", type=click.IntRange(min=2), default=4, show_default=True, help="Images per renderer.")
 @click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")

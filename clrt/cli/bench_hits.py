@@ -38,16 +38,26 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
 def _lines(result: Mapping[str, Any]) -> list[str]:
     """Return a line per configuration: for how many rays of each kind the result differs from the first line's."""
     title = f"  {'device layout builder      traversal':40}{'rays':>9}"
-    lines = [f"{result['mesh']}: {result['triangles']} triangles, {result['rays']} rays",
-             title + "".join(f"{kind:>10}" for kind in result["kinds"])]
+    lines = [
+        f"{result['mesh']}: {result['triangles']} triangles, {result['rays']} rays",
+        title + "".join(f"{kind:>10}" for kind in result["kinds"]),
+    ]
     for way in result["ways"]:
         line = f"  {way['device']:<6} {way['layout']:6} {way['builder']:12} {way['traversal']:9}    "
-        lines.append(line + (way["error"] if "error" in way else f"{way['rays']:9}" + "".join(
-            f"{count:10}" for count in way["differ"].values())))
+        lines.append(
+            line
+            + (
+                way["error"]
+                if "error" in way
+                else f"{way['rays']:9}" + "".join(f"{count:10}" for count in way["differ"].values())
+            )
+        )
     if "exact" in result:
         exact = result["exact"]
-        lines.append(f"  checked in float64: {exact['wrong']} of {exact['rays']} hits impossible (only one triangle "
-                     f"was possible for {exact['decided']})")
+        lines.append(
+            f"  checked in float64: {exact['wrong']} of {exact['rays']} hits impossible (only one triangle "
+            f"was possible for {exact['decided']})"
+        )
         if result["escaped"] is not None:
             lines.append(f"  rays from the inside that hit nothing: {result['escaped']}")
         lines.append(f"  hits on degenerate triangles (collinear corners, seams between others): {result['flat']}")

@@ -55,8 +55,10 @@ def _family(name: str, tests: Mapping[str, Mapping[str, Any]]) -> list[str]:
     figures = FIGURES[name]
     lines = [f"  {name:18}{'M/s':>9}{'relative speed':>18}" + "".join(f"{title:>17}" for title in figures.values())]
     for test, row in tests.items():
-        lines.append(f"  {test:18}{row['mrays']:9.3g}{1 / row['ratio']:9.2f} ({1 / row['cpu_ratio']:5.2f})  "
-                     + "".join(f"{row[key]:17.6g}" for key in figures))
+        lines.append(
+            f"  {test:18}{row['mrays']:9.3g}{1 / row['ratio']:9.2f} ({1 / row['cpu_ratio']:5.2f})  "
+            + "".join(f"{row[key]:17.6g}" for key in figures)
+        )
     return lines
 
 

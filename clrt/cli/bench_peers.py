@@ -37,8 +37,10 @@ def peers_command(mesh: Path | None, device: str | None, quick: bool, json_file:
 def _lines(result: Mapping[str, Any]) -> list[str]:
     on_cpu = result["device_type"] == "cpu"
     lines = [f"{result['scene']}: {result['triangles']} triangles; {result['device']}, {result['platform']}"]
-    lines += [f"  BVH of {name:23}{tree['seconds']:8.2f} s {tree['bytes'] / 1e6:8.1f} MB"
-              for name, tree in result["trees"].items()]
+    lines += [
+        f"  BVH of {name:23}{tree['seconds']:8.2f} s {tree['bytes'] / 1e6:8.1f} MB"
+        for name, tree in result["trees"].items()
+    ]
     hits = (f"{result['hits'][name]:9.2f} of{kind['clrt']['rays']:9}" for name, kind in result["kernels"].items())
     lines.append(f"  {'fraction of hits':24}{'  '.join(hits)}")
     lines += race_table("kernels alone", result["kernels"], on_cpu)

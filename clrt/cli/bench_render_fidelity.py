@@ -13,18 +13,38 @@ from .bench_files import figures_options, write_figures
 
 @click.command("render-fidelity")
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
-@click.option("--scenario", "scenarios_", multiple=True, metavar="TEXT",
-              help="Only scenarios whose name contains this; may be repeated.")
-@click.option("--width", type=click.IntRange(min=16),
-              help="Image width; the other renderers' images are scaled down to it. Default: their own width.")
+@click.option(
+    "--scenario",
+    "scenarios_",
+    multiple=True,
+    metavar="TEXT",
+    help="Only scenarios whose name contains this; may be repeated.",
+)
+@click.option(
+    "--width",
+    type=click.IntRange(min=16),
+    help="Image width; the other renderers' images are scaled down to it. Default: their own width.",
+)
 @click.option("--spp", type=click.IntRange(min=1), default=32, show_default=True, help="Samples per pixel.")
 @click.option("--denoise", is_flag=True, help="Denoise clrt's images, as Cycles' were.")
-@click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
-              help="Write clrt's and the other renderers' images there, side by side, as PNG.")
+@click.option(
+    "--pictures",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write clrt's and the other renderers' images there, side by side, as PNG.",
+)
 @click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @figures_options
-def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: int | None, spp: int, denoise: bool,
-                            pictures: Path | None, device: str | None, json_file: Path | None) -> None:
+def render_fidelity_command(
+    folder: Path,
+    scenarios_: tuple[str, ...],
+    width: int | None,
+    spp: int,
+    denoise: bool,
+    pictures: Path | None,
+    device: str | None,
+    json_file: Path | None,
+) -> None:
     """Render the glTF models in DIR, a checkout of github.com/KhronosGroup/glTF-Render-Fidelity with its submodules,
     and compare the images with those of Cycles, V-Ray, Stellar, dspbr and three-gpu-pathtracer.
 
@@ -60,5 +80,6 @@ def _line(row: Mapping[str, Any]) -> str:
         return f"{start}{', '.join(row['flip'])} alone"
     means = row["means"]
     strayed = ", ".join(f"{name} {means[name]['beyond']:.2f}" for name in row["strayed"] if name)
-    return (f"{start}{row['mean_flip']:6.3f}{row['spread']:8.3f}{means['']['beyond']:8.3f}  {strayed}"
-            + "".join(f"  ({warning})" for warning in row["warnings"]))
+    return f"{start}{row['mean_flip']:6.3f}{row['spread']:8.3f}{means['']['beyond']:8.3f}  {strayed}" + "".join(
+        f"  ({warning})" for warning in row["warnings"]
+    )

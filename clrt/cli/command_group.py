@@ -8,8 +8,9 @@ import click
 class CommandGroup(click.Group):
     """Group of commands that suggests the closest name for a misspelled one."""
 
-    def resolve_command(self, context: click.Context, arguments: list[str]
-                        ) -> tuple[str | None, click.Command | None, list[str]]:
+    def resolve_command(
+        self, context: click.Context, arguments: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
         if arguments and not arguments[0].startswith("-") and self.get_command(context, arguments[0]) is None:
             from ..scene.validation.field_types import unknown  # imports numpy, which valid commands do not need yet
 

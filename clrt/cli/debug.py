@@ -16,18 +16,35 @@ from .options import picture_options, tracing_options
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
-@click.option("--pixel", type=Pixel(),
-              help="Column and row of the pixel; 0,0 is the upper left corner. Default: the center.")
-@click.option("--samples", type=click.IntRange(min=0), default=4, show_default=True, metavar="N",
-              help="Number of the pixel's samples to list, starting with the first.")
-@click.option("--spp", type=click.IntRange(min=1),
-              help="Samples per pixel of the render; all are traced for the summary. Default: the scene's.")
+@click.option(
+    "--pixel", type=Pixel(), help="Column and row of the pixel; 0,0 is the upper left corner. Default: the center."
+)
+@click.option(
+    "--samples",
+    type=click.IntRange(min=0),
+    default=4,
+    show_default=True,
+    metavar="N",
+    help="Number of the pixel's samples to list, starting with the first.",
+)
+@click.option(
+    "--spp",
+    type=click.IntRange(min=1),
+    help="Samples per pixel of the render; all are traced for the summary. Default: the scene's.",
+)
 @click.option("--device", metavar="SEL", help="Device: number, id, part of a name, cpu or gpu; see `clrt devices`.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @picture_options
 @tracing_options
-def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: str | None, as_json: bool,
-            camera: str | None, **given: Any) -> None:
+def command(
+    scene: Path,
+    pixel: tuple[int, int] | None,
+    samples: int,
+    device: str | None,
+    as_json: bool,
+    camera: str | None,
+    **given: Any,
+) -> None:
     """Show the light paths of one pixel of SCENE, and why it is black or where its light comes from. With the options
     of a render, the samples are exactly those of that render."""
     if click.get_current_context().obj == PROGRAM:
@@ -50,11 +67,21 @@ def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: st
     found = summary(paths, names)
     listed = [(i, paths.values[i].tolist(), list(vertices(paths, names, i))) for i in range(min(samples, settings.spp))]
     if as_json:
-        answer = {"scene": content.name, "pixel": pixel, "size": settings.size, "integrator": settings.integrator,
-                  "max_depth": settings.max_depth, "seed": settings.seed, "spp": settings.spp,
-                  "value": paths.value.tolist(), "dropped": settings.spp - int(paths.kept.sum()), "summary": found,
-                  "samples": [{"sample": i, "value": value, "vertices": [asdict(each) for each in path]}
-                              for i, value, path in listed]}
+        answer = {
+            "scene": content.name,
+            "pixel": pixel,
+            "size": settings.size,
+            "integrator": settings.integrator,
+            "max_depth": settings.max_depth,
+            "seed": settings.seed,
+            "spp": settings.spp,
+            "value": paths.value.tolist(),
+            "dropped": settings.spp - int(paths.kept.sum()),
+            "summary": found,
+            "samples": [
+                {"sample": i, "value": value, "vertices": [asdict(each) for each in path]} for i, value, path in listed
+            ],
+        }
         click.echo(json_text(answer))
         return
     for i, value, path in listed:

@@ -21,8 +21,14 @@ if TYPE_CHECKING:
 @click.option("--check", is_flag=True, help="Check each device against known results, and store the outcome.")
 @click.option("--bench", is_flag=True, help="Measure each device's rays per second, and rank by it.")
 @click.option("--device", "selectors", multiple=True, metavar="SEL", help="Only this device; may be repeated.")
-@click.option("--limit", type=Finite(1.0), default=300.0, show_default=True, metavar="SECONDS",
-              help="Time limit of a device's check or measurement.")
+@click.option(
+    "--limit",
+    type=Finite(1.0),
+    default=300.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Time limit of a device's check or measurement.",
+)
 @verbose_option
 def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...], limit: float) -> None:
     """List the OpenCL devices, best first; * marks the default.
@@ -43,8 +49,11 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     verdicts: dict[str, Verdict] = {}
     problems = [problem for info in tried if check and (problem := _checked(info, limit, verdicts))]
     problems += [problem for info in tried if bench and (problem := _measured(info, limit))]
-    found = [replace(info, check=verdicts.get(info.id, info.check)) for info, _ in find_devices(preference=preference)
-             if not wanted or info.id in wanted]
+    found = [
+        replace(info, check=verdicts.get(info.id, info.check))
+        for info, _ in find_devices(preference=preference)
+        if not wanted or info.id in wanted
+    ]
     if as_json:
         click.echo(json_text([as_dict(info) for info in found], indent=1))
     else:
@@ -52,11 +61,15 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     if not found:
         click.echo(no_device(), err=True)
     if preference:
-        click.echo(f"{preference.origin} selects {preference.selector!r}: device {select()[0].index} is the default",
-                   err=True)
-    problems += [f"{info.name} failed the check: update the driver and run `clrt devices --check` again; until that "
-                 "passes, it is used only if selected explicitly"
-                 for info in found if info.id in verdicts and info.failed]
+        click.echo(
+            f"{preference.origin} selects {preference.selector!r}: device {select()[0].index} is the default", err=True
+        )
+    problems += [
+        f"{info.name} failed the check: update the driver and run `clrt devices --check` again; until that "
+        "passes, it is used only if selected explicitly"
+        for info in found
+        if info.id in verdicts and info.failed
+    ]
     if problems:
         raise DeviceError("; ".join(problems))
 
@@ -93,13 +106,17 @@ def _checked(info: DeviceInfo, limit: float, verdicts: dict[str, Verdict]) -> st
 def _lines(info: DeviceInfo) -> Iterator[str]:
     yield f"{'*' if info.chosen else ' '} {info.index}  {info.id}  {info.type:11}  {info.name}"
     if info.type != "none":
-        yield (f"     {info.platform}, {info.platform_version}, driver {info.driver}; "
-               f"{info.compute_units} compute units, {info.global_bytes / 2**30:.1f} GiB")
+        yield (
+            f"     {info.platform}, {info.platform_version}, driver {info.driver}; "
+            f"{info.compute_units} compute units, {info.global_bytes / 2**30:.1f} GiB"
+        )
     yield from (f"     {place}" for place in info.hardware)
     yield f"     {'usable' if info.usable else 'not usable'}: {info.why}"
     if info.bench:
-        yield (f"     Mrays/s: {info.bench.mrays_primary:.3g} primary, {info.bench.mrays_bounce:.3g} bounce, "
-               f"{info.bench.mrays_shadow:.3g} shadow")
+        yield (
+            f"     Mrays/s: {info.bench.mrays_primary:.3g} primary, {info.bench.mrays_bounce:.3g} bounce, "
+            f"{info.bench.mrays_shadow:.3g} shadow"
+        )
     if not info.usable:
         return
     if info.check is None:

@@ -16,8 +16,13 @@ FORMS = (".txt", ".json", ".zip")
 
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="FILE",
-              help="Write the report there: .txt, .json, or .zip with both and the logs.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write the report there: .txt, .json, or .zip with both and the logs.",
+)
 @click.option("--force", is_flag=True, help="Replace a file that is read-only.")
 def command(as_json: bool, output: Path | None, force: bool) -> None:
     """Report versions, drivers, devices, their checks, the cache and the last logs.
@@ -47,8 +52,9 @@ def command(as_json: bool, output: Path | None, force: bool) -> None:
 
 def as_text(found: dict[str, Any]) -> str:
     """Format the report as text: a heading for each part, followed by its entries."""
-    return "".join(f"== {name}\n" + "".join(f"{line}\n" for line in _lines(value)) + "\n"
-                   for name, value in found.items())
+    return "".join(
+        f"== {name}\n" + "".join(f"{line}\n" for line in _lines(value)) + "\n" for name, value in found.items()
+    )
 
 
 def _lines(value: Any, indent: str = "") -> Iterator[str]:

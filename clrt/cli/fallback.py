@@ -26,7 +26,7 @@ def _write_elsewhere(path: Path, write: Callable[[Path], object]) -> Path | None
     """Return the path of the fallback file, whose name is unique; None if no folder is writable."""
     name = f"{path.stem}-{os.urandom(4).hex()}{path.suffix}"
     for folder in FOLDERS:
-        with suppress(OSError, RuntimeError, ClrtError):     # the folder may not exist
+        with suppress(OSError, RuntimeError, ClrtError):  # the folder may not exist
             kept = folder() / name
             write(kept)
             return kept

@@ -32,10 +32,16 @@ class ClusterOptions:
     """A cluster that renders instead of this machine's devices."""
 
     scheduler: str | None = flag(
-        "--scheduler", metavar="ADDRESS",
-        help="Render on the workers of a Dask scheduler, tcp://… or tls://…; --device is one of theirs.")
-    local_cluster: int | None = flag("--local-cluster", type=click.IntRange(min=1), metavar="N",
-                                     help="Render with N worker processes on this machine; needs Dask.")
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Render on the workers of a Dask scheduler, tcp://… or tls://…; --device is one of theirs.",
+    )
+    local_cluster: int | None = flag(
+        "--local-cluster",
+        type=click.IntRange(min=1),
+        metavar="N",
+        help="Render with N worker processes on this machine; needs Dask.",
+    )
 
 
 @contextmanager
@@ -72,21 +78,30 @@ def is_huge(size: tuple[int, int]) -> bool:
     return size[0] * size[1] > HUGE
 
 
-def render_huge(cluster: Cluster, scene: Scene, options: RendererOptions, goal: Goal, results: Outputs,
-                progress: Progress) -> bool:
+def render_huge(
+    cluster: Cluster, scene: Scene, options: RendererOptions, goal: Goal, results: Outputs, progress: Progress
+) -> bool:
     """Render in bands, each to the goal, and write the results; return False if interrupted."""
     from ..farm.banded_picture import BandedPicture
     from ..farm.orders import PictureOrder
 
-    for name, value in {"--time": goal.seconds, "--aov": options["aovs"] or None, "--plot": results.plot,
-                        "--denoise": results.denoise or None}.items():
+    for name, value in {
+        "--time": goal.seconds,
+        "--aov": options["aovs"] or None,
+        "--plot": results.plot,
+        "--denoise": results.denoise or None,
+    }.items():
         if value is not None:
-            raise UsageError(f"{name}: is not supported for images of more than 8 million pixels, which are rendered "
-                             "in bands, each by a worker; leave it out, or choose a smaller --size")
+            raise UsageError(
+                f"{name}: is not supported for images of more than 8 million pixels, which are rendered "
+                "in bands, each by a worker; leave it out, or choose a smaller --size"
+            )
     checkpoint, resume = options["checkpoint"], options["resume"]
     chosen = {name: value for name, value in _of_worker(options).items() if name != "aovs"}
-    banded = BandedPicture(PictureOrder(scene, chosen, spp=goal.spp, error=goal.error),
-                           Path(checkpoint or f"{next(iter(results.pictures), 'image')}.bands"))
+    banded = BandedPicture(
+        PictureOrder(scene, chosen, spp=goal.spp, error=goal.error),
+        Path(checkpoint or f"{next(iter(results.pictures), 'image')}.bands"),
+    )
     interrupted: list[bool] = []
     with Interruptible(lambda: interrupted.append(True)):
         for done, count in banded.render(cluster, resume):
@@ -102,18 +117,25 @@ def render_huge(cluster: Cluster, scene: Scene, options: RendererOptions, goal: 
     return not interrupted
 
 
-def render_frames(cluster: Cluster, scene: Scene, options: RendererOptions, goal: Goal, sequence: FrameSequence,
-                  progress: Progress) -> bool:
+def render_frames(
+    cluster: Cluster, scene: Scene, options: RendererOptions, goal: Goal, sequence: FrameSequence, progress: Progress
+) -> bool:
     """Render the remaining frames, each on a worker, and encode the videos; return False if interrupted."""
     from ..farm.orders import PictureOrder
     from ..farm.whole_pictures import WholePictures
     from ..output.image import Image
 
     order = PictureOrder(scene, _of_worker(options), goal.spp, goal.seconds, goal.error, sequence.outputs.denoise)
-    shots = {f"frame {results.header['frame']}": (results, camera)
-             for results, camera in sequence.left(order.settled, order.choices, goal)}
-    pictures = WholePictures(cluster, list(shots), lambda name: replace(order, camera=shots[name][1]),
-                             cast(tuple[str, ...], options["device"] or ()))
+    shots = {
+        f"frame {results.header['frame']}": (results, camera)
+        for results, camera in sequence.left(order.settled, order.choices, goal)
+    }
+    pictures = WholePictures(
+        cluster,
+        list(shots),
+        lambda name: replace(order, camera=shots[name][1]),
+        cast(tuple[str, ...], options["device"] or ()),
+    )
     interrupted, done, warned = list[bool](), 0, set[str]()
     progress.phase("render")
     with Interruptible(lambda: interrupted.append(True)):

@@ -32,8 +32,12 @@ class FrameNumbers(click.ParamType[str]):
 
     def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> str:
         if value != "all" and not _numbers(str(value)):
-            self.fail(f"{value!r} is not a list of frames; write all, or numbers and ranges such as 12, 0-47, 0-99:5 "
-                      "or 3,7,20-30", param, context)
+            self.fail(
+                f"{value!r} is not a list of frames; write all, or numbers and ranges such as 12, 0-47, 0-99:5 "
+                "or 3,7,20-30",
+                param,
+                context,
+            )
         return str(value)
 
 
@@ -42,13 +46,20 @@ class FrameOptions:
     """Which frames are rendered; without `frames` and `turntable` it is a still image."""
 
     frames: str | None = flag(
-        "--frames", type=FrameNumbers(),
+        "--frames",
+        type=FrameNumbers(),
         help="Frames of an animation, written to numbered files (name_####.png) or a video (.gif, .mp4, .webm): all, "
-             "or numbers and ranges such as 12, 0-47, 0-99:5.")
-    turntable: int | None = flag("--turntable", type=click.IntRange(min=1), metavar="N",
-                                 help="Orbit once around the point the camera looks at, in N frames.")
-    fps: float | None = flag("--fps", type=click.FloatRange(min=0, min_open=True),
-                             help="Frames per second; default: the scene's.")
+        "or numbers and ranges such as 12, 0-47, 0-99:5.",
+    )
+    turntable: int | None = flag(
+        "--turntable",
+        type=click.IntRange(min=1),
+        metavar="N",
+        help="Orbit once around the point the camera looks at, in N frames.",
+    )
+    fps: float | None = flag(
+        "--fps", type=click.FloatRange(min=0, min_open=True), help="Frames per second; default: the scene's."
+    )
 
     @property
     def many(self) -> bool:
@@ -89,9 +100,12 @@ class FrameSequence:
     def _of(self, number: int) -> Outputs:
         """Return the outputs of a frame."""
         asked = self.outputs
-        return replace(asked, pictures=tuple(numbered(path, number) for path in asked.pictures),
-                       report=asked.report and numbered(asked.report, number),
-                       spool=asked.spool and numbered(asked.spool, number))
+        return replace(
+            asked,
+            pictures=tuple(numbered(path, number) for path in asked.pictures),
+            report=asked.report and numbered(asked.report, number),
+            spool=asked.spool and numbered(asked.spool, number),
+        )
 
     def check_apart(self, inputs: Iterable[Path]) -> None:
         """Apply `Outputs.check_apart` to every frame and video."""
@@ -100,8 +114,9 @@ class FrameSequence:
             self._of(number).check_apart(inputs)
         for video in self.videos:
             if os.path.realpath(video) in files:
-                raise UsageError(f"{video}: is both a file of the scene and a video, one of which would be lost; "
-                                 "choose another file")
+                raise UsageError(
+                    f"{video}: is both a file of the scene and a video, one of which would be lost; choose another file"
+                )
 
     def left(self, scene: Scene, choices: Choices, goal: object) -> Iterator[tuple[Outputs, Camera]]:
         """Yield outputs and camera of each remaining frame. Finished images contain a hash of all they depend on."""
@@ -118,8 +133,9 @@ class FrameSequence:
             made_of = repr((sorted(facts.items()), camera, goal, shown))
             digest = hashlib.sha256(made_of.encode()).hexdigest()
             outputs = replace(self._of(number), header={"frame": number, "frame_hash": digest})
-            done = self.resume and all(metadata_of(path, "clrt:frame_hash") == digest
-                                       for path in (*outputs.pictures, *outputs.raws))
+            done = self.resume and all(
+                metadata_of(path, "clrt:frame_hash") == digest for path in (*outputs.pictures, *outputs.raws)
+            )
             if not (done and all(path.is_file() for path in (*outputs.beside, outputs.report) if path)):
                 outputs.check_unprotected()
                 yield outputs, camera
@@ -138,7 +154,7 @@ class FrameSequence:
         if spool := self.outputs.spool:
             for number in self._stills:
                 numbered(spool, number).unlink(missing_ok=True)
-            with suppress(OSError):   # it may contain other files
+            with suppress(OSError):  # it may contain other files
                 spool.parent.rmdir()
 
 

@@ -42,7 +42,7 @@ def guarded(advice: Callable[[], str]) -> None:
         os._exit(_watch(child, watched, limit, advice))
     os.setpgid(0, 0)
     _die_with(parent)
-    end_by_signals()    # before any can come: there is more to load until it is known what to keep
+    end_by_signals()  # before any can come: there is more to load until it is known what to keep
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
@@ -60,7 +60,7 @@ def _watch(child: int, watched: set[signal.Signals], limit: float, advice: Calla
     waited, last_call, stopped = 0, 0, False
     while True:
         came = signal.sigtimedwait(watched, limit / LOOKS)
-        if came is not None and came.si_signo not in watched:   # after a stop longer than the timeout
+        if came is not None and came.si_signo not in watched:  # after a stop longer than the timeout
             came = None
         changed, status = os.waitpid(child, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
         if changed and (os.WIFEXITED(status) or os.WIFSIGNALED(status)):
@@ -71,8 +71,11 @@ def _watch(child: int, watched: set[signal.Signals], limit: float, advice: Calla
         last_call = call
         if waited > LOOKS:
             os.kill(child, signal.SIGKILL)
-            _say(f"the driver has not returned from a call in {limit:g} s: it hangs, or its device is lost; if calls "
-                 f"may take that long, set {VARIABLE} to more seconds", advice)
+            _say(
+                f"the driver has not returned from a call in {limit:g} s: it hangs, or its device is lost; if calls "
+                f"may take that long, set {VARIABLE} to more seconds",
+                advice,
+            )
             return DEVICE
         if came is not None and came.si_signo == signal.SIGTSTP:
             os.kill(child, signal.SIGSTOP)
@@ -93,8 +96,10 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
         damaged = remove_damaged()
         cause = "most likely in the device's driver: run `clrt devices --check`"
         if damaged:
-            cause = (f"because {damaged} of the programs that PoCL caches in {kept_programs()} were damaged: they have "
-                     "been removed, run it again")
+            cause = (
+                f"because {damaged} of the programs that PoCL caches in {kept_programs()} were damaged: they have "
+                "been removed, run it again"
+            )
         if full := no_room():
             cause = f"because {full}"
         _say(f"the render crashed ({name}), {cause}", advice)
@@ -105,5 +110,5 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
 
 
 def _say(problem: str, advice: Callable[[], str]) -> None:
-    start = "\n" if sys.stderr.isatty() else ""     # end a progress line
+    start = "\n" if sys.stderr.isatty() else ""  # end a progress line
     print(f"{start}error: {problem}{advice()}", file=sys.stderr, flush=True)

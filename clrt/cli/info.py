@@ -18,11 +18,16 @@ if TYPE_CHECKING:
 @click.option("--materials", "list_materials", is_flag=True, help="List all material types and presets instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @click.option("--aov", "aovs", multiple=True, metavar="NAME,...", help="Include what these AOVs need.")
-@click.option("--device", "selector", metavar="SEL",
-              help="Device to compile for; see `clrt devices`. Default: the best, or a CPU if there is none.")
+@click.option(
+    "--device",
+    "selector",
+    metavar="SEL",
+    help="Device to compile for; see `clrt devices`. Default: the best, or a CPU if there is none.",
+)
 @tracing_options
-def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple[str, ...], selector: str | None,
-            **chosen: Any) -> None:
+def command(
+    scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple[str, ...], selector: str | None, **chosen: Any
+) -> None:
     """Show what SCENE contains and what is compiled for it, without rendering; needs no device."""
     if list_materials:
         from .material_list import material_lines
@@ -44,8 +49,11 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
     content = load(scene)
     choices = choices_of({**chosen, "aovs": names})
     compiled = compile_scene(content, choices, device=_device(selector))
-    report = {**scene_report(content, compiled, names), "material_list": materials_in(content),
-              "light_list": lights_in(content)}
+    report = {
+        **scene_report(content, compiled, names),
+        "material_list": materials_in(content),
+        "light_list": lights_in(content),
+    }
     for line in [json_text(report)] if as_json else report_lines(report):
         click.echo(line)
 

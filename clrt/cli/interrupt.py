@@ -7,7 +7,7 @@ import signal
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
-NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")     # the last one is Windows' Ctrl-Break
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last one is Windows' Ctrl-Break
 HANG_UP = getattr(signal, "SIGHUP", None)
 
 
@@ -34,8 +34,9 @@ class Interruptible:
             signal.signal(number, self._heed)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         end_by_signals()
 
     def _heed(self, number: int, frame: FrameType | None) -> None:

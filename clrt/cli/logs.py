@@ -13,8 +13,14 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def verbose_option(command: F) -> F:
     """Add `-v`, which also shows informational messages, and `-vv`, which shows all messages."""
-    return click.option("-v", "--verbose", count=True, expose_value=False, callback=_show_more,
-                        help="Show informational messages; -vv shows debug messages, too.")(command)
+    return click.option(
+        "-v",
+        "--verbose",
+        count=True,
+        expose_value=False,
+        callback=_show_more,
+        help="Show informational messages; -vv shows debug messages, too.",
+    )(command)
 
 
 def silence() -> None:
@@ -24,7 +30,7 @@ def silence() -> None:
 
 
 def _show_more(context: click.Context, parameter: click.Parameter, count: int) -> None:
-    last = logging.lastResort    # looks up sys.stderr for each message, so it works with a bar
+    last = logging.lastResort  # looks up sys.stderr for each message, so it works with a bar
     if count and last is not None:
         level = logging.INFO if count == 1 else logging.DEBUG
         last.setLevel(level)

@@ -22,12 +22,22 @@ LIMITS = {Ge: "at least", Gt: "above", Le: "at most", Lt: "below"}
 def material_list() -> dict[str, Any]:
     """Return the fields that all types share, the types, and the presets."""
     shared = _described(Material, SHARED)
-    types = [{"type": kind.kernel, "about": (kind.__doc__ or "").split("\n")[0],
-              "fields": _described(kind, {field.name for field in fields(kind)} - SHARED)} for kind in MATERIALS]
-    f0 = {name: {"f0": color, "kind": "metal" if metallic else "not a metal"}
-          for name, (color, metallic) in F0_PRESETS.items()}
-    conductors = {name: {"eta": eta, "k": k, "f0": tuple(map(_normal_reflectance, eta, k))}
-                  for name, (eta, k) in CONDUCTORS.items()}
+    types = [
+        {
+            "type": kind.kernel,
+            "about": (kind.__doc__ or "").split("\n")[0],
+            "fields": _described(kind, {field.name for field in fields(kind)} - SHARED),
+        }
+        for kind in MATERIALS
+    ]
+    f0 = {
+        name: {"f0": color, "kind": "metal" if metallic else "not a metal"}
+        for name, (color, metallic) in F0_PRESETS.items()
+    }
+    conductors = {
+        name: {"eta": eta, "k": k, "f0": tuple(map(_normal_reflectance, eta, k))}
+        for name, (eta, k) in CONDUCTORS.items()
+    }
     return {"every_type": shared, "types": types, "presets": {"metallic_roughness": f0, "conductor": conductors}}
 
 
@@ -47,13 +57,16 @@ def material_lines(as_json: bool) -> Iterator[str]:
 
 
 def _normal_reflectance(eta: float, k: float) -> float:
-    return round(((eta - 1)**2 + k * k) / ((eta + 1)**2 + k * k), 3)
+    return round(((eta - 1) ** 2 + k * k) / ((eta + 1) ** 2 + k * k), 3)
 
 
 def _described(kind: type[Material], names: set[str] | frozenset[str]) -> list[dict[str, Any]]:
     hints = get_type_hints(kind, include_extras=True)
-    return [{"name": field.name, "values": " or ".join(_values(hints[field.name])), "default": field.default}
-            for field in fields(kind) if field.name in names]
+    return [
+        {"name": field.name, "values": " or ".join(_values(hints[field.name])), "default": field.default}
+        for field in fields(kind)
+        if field.name in names
+    ]
 
 
 def _values(hint: Any) -> Iterator[str]:
@@ -69,8 +82,11 @@ def _values(hint: Any) -> Iterator[str]:
         yield f"{len(parts)} numbers{', each' * bool(number)}{number}"
     elif origin is Annotated:
         words = {type(limit): f"{limit.bound:g}" for limit in parts[1:]}
-        limits = f"{words[Ge]} to {words[Le]}" if {Ge, Le} <= set(words) else " and ".join(
-            f"{LIMITS[limit]} {bound}" for limit, bound in words.items())
+        limits = (
+            f"{words[Ge]} to {words[Le]}"
+            if {Ge, Le} <= set(words)
+            else " and ".join(f"{LIMITS[limit]} {bound}" for limit, bound in words.items())
+        )
         yield f"a number {limits}"
     else:
         yield {bool: "true or false", Texture: "a texture", float: "a number"}[hint]
@@ -78,7 +94,7 @@ def _values(hint: Any) -> Iterator[str]:
 
 def _field_line(field: dict[str, Any]) -> str:
     default = "none" if field["default"] is None else show(field["default"])
-    return f'  {field["name"]:22}{default:20}{field["values"]}'
+    return f"  {field['name']:22}{default:20}{field['values']}"
 
 
 def _short(value: Any) -> str:

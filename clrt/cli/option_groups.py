@@ -23,6 +23,7 @@ def flag(*names: str, default: Any = None, **settings: Any) -> Any:
 
 def grouped(name: str, kind: type) -> Decorator:
     """Add the options that are the fields of a dataclass; the command receives the object by this name."""
+
     def decorate(command: Any) -> Any:
         @wraps(command)
         def called(**given: Any) -> Any:
@@ -37,8 +38,9 @@ def grouped(name: str, kind: type) -> Decorator:
     return decorate
 
 
-def settings_options(kind: type, names: Mapping[str, str] = {}, without: Collection[str] = (),
-                     defaults: bool = True) -> Decorator:
+def settings_options(
+    kind: type, names: Mapping[str, str] = {}, without: Collection[str] = (), defaults: bool = True
+) -> Decorator:
     """Add an option for each described field of a settings object; the command receives them by the fields' names.
 
     names: options that are not called like their field; defaults: whether they have the fields' defaults, else None.
@@ -59,16 +61,29 @@ def _option(each: Field[Any], hint: Any, name: str | None, defaults: bool) -> De
     name = name or f"--{each.name.replace('_', '-')}"
     told: dict[str, Any] = {"help": each.metadata["description"]}
     if hint is bool:
-        return click.option(f"{name}/--no-{name[2:]}" if each.default else name, each.name, is_flag=True, default=None,
-                            **told)
+        return click.option(
+            f"{name}/--no-{name[2:]}" if each.default else name, each.name, is_flag=True, default=None, **told
+        )
     kind, values = _without_none(hint), each.metadata["values"]
     if kind is bool:
-        return click.option(name, each.name, type=click.Choice(["on", "off"]), **told,
-                            callback=lambda context, parameter, value: value and value == "on")
+        return click.option(
+            name,
+            each.name,
+            type=click.Choice(["on", "off"]),
+            **told,
+            callback=lambda context, parameter, value: value and value == "on",
+        )
     default = each.default if defaults else None
     value = click.Choice(values) if values else _type(kind)
-    return click.option(name, each.name, type=value, metavar="X" if isinstance(value, Finite) else None, **told,
-                        default=default, show_default=default is not None)
+    return click.option(
+        name,
+        each.name,
+        type=value,
+        metavar="X" if isinstance(value, Finite) else None,
+        **told,
+        default=default,
+        show_default=default is not None,
+    )
 
 
 def _without_none(hint: Any) -> Any:

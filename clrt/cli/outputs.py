@@ -72,10 +72,14 @@ class Outputs:
         from ..output.view_transform import check_view
 
         check_view(self.view, self.exposure)
-        if self.aovs and (all(picture.suffix.lower() == ".hdr" for picture in self._kept)
-                          and all(pipe.suffix != ".exr" for pipe in self.pipes)):
-            raise UsageError("an .hdr file, a video or a .png in a pipe cannot store AOVs; for --aov add an .exr or "
-                             ".png file with -o")
+        if self.aovs and (
+            all(picture.suffix.lower() == ".hdr" for picture in self._kept)
+            and all(pipe.suffix != ".exr" for pipe in self.pipes)
+        ):
+            raise UsageError(
+                "an .hdr file, a video or a .png in a pipe cannot store AOVs; for --aov add an .exr or "
+                ".png file with -o"
+            )
         self.check_apart((), checkpoint)
         for pipe in self.pipes:
             pipe.check()
@@ -98,17 +102,23 @@ class Outputs:
 
     def check_apart(self, inputs: Iterable[Path], checkpoint: Path | None = None) -> None:
         """Check that results do not overwrite files of the scene, or each other."""
-        named = {"an image (-o)": self.pictures,
-                 "the raw image (--denoise)": self.raws, "an AOV (--aov)": self.beside,
-                 "the --report": (self.report,), "the --plot": (self.plot,),
-                 "the --checkpoint": (checkpoint,), "the previous checkpoint": (checkpoint and Path(f"{checkpoint}~"),)}
+        named = {
+            "an image (-o)": self.pictures,
+            "the raw image (--denoise)": self.raws,
+            "an AOV (--aov)": self.beside,
+            "the --report": (self.report,),
+            "the --plot": (self.plot,),
+            "the --checkpoint": (checkpoint,),
+            "the previous checkpoint": (checkpoint and Path(f"{checkpoint}~"),),
+        }
         taken = {os.path.realpath(path): "a file of the scene" for path in inputs}
         taken |= {os.path.realpath(path): what for path, what in zip(self.inputs, ("the scene", "the reference"))}
         for what, paths in named.items():
             for path in filter(None, paths):
                 if before := taken.get(real := os.path.realpath(path)):
-                    raise UsageError(f"{path}: is both {before} and {what}, one of which would be lost; choose another "
-                                     "file")
+                    raise UsageError(
+                        f"{path}: is both {before} and {what}, one of which would be lost; choose another file"
+                    )
                 taken[real] = what
 
     def save(self, image: Image, raw: bool = False) -> None:

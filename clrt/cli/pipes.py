@@ -32,8 +32,10 @@ class Pipe:
     def check(self) -> None:
         """Raise UsageError if it is a terminal or closed, OutputError if the format is unknown."""
         if self.suffix[1:] not in FORMATS:
-            raise OutputError(f"{self.path}: unknown image format {self.suffix}; write FORMAT:{self.path}, with "
-                              f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
+            raise OutputError(
+                f"{self.path}: unknown image format {self.suffix}; write FORMAT:{self.path}, with "
+                f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}"
+            )
         if self.path == STDOUT and sys.__stdout__ is None:
             raise UsageError("-o -: standard output is closed; redirect it to a file or a program")
         if self._is_terminal():

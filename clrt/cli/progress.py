@@ -12,8 +12,15 @@ from .streams import tell
 if TYPE_CHECKING:
     from ..rendering.renderer import State
 
-PHASES = {"connect": "starting the workers", "load": "loading the scene", "build": "building the BVH",
-          "compile": "compiling the kernel", "render": "rendering", "write": "writing", "denoise": "denoising"}
+PHASES = {
+    "connect": "starting the workers",
+    "load": "loading the scene",
+    "build": "building the BVH",
+    "compile": "compiling the kernel",
+    "render": "rendering",
+    "write": "writing",
+    "denoise": "denoising",
+}
 
 
 class Progress:
@@ -52,8 +59,9 @@ class Progress:
     def __enter__(self) -> Progress:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         """End the display."""
 
 
@@ -93,8 +101,9 @@ class JsonProgress(Progress):
         logging.getLogger().addHandler(self._log)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         logging.getLogger().removeHandler(self._log)
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
@@ -107,9 +116,15 @@ class JsonProgress(Progress):
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
-        values: dict[str, Any] = {"phase": "render", "spp": state.spp, "seconds": state.seconds, "noise": state.noise,
-                                  "relmse": state.relmse, "samples_per_second": self._pace.rate,
-                                  "seconds_left": left}
+        values: dict[str, Any] = {
+            "phase": "render",
+            "spp": state.spp,
+            "seconds": state.seconds,
+            "noise": state.noise,
+            "relmse": state.relmse,
+            "samples_per_second": self._pace.rate,
+            "seconds_left": left,
+        }
         if self._workers:
             values["workers"] = self._workers
         _tell_json(values)

@@ -29,17 +29,31 @@ if TYPE_CHECKING:
 @grouped("asked", OutputOptions)
 @picture_options
 @grouped("stop", StopOptions)
-@click.option("--device", "devices", multiple=True, metavar="SEL",
-              help="Device: number, id, part of a name, cpu or gpu; see `clrt devices`. Repeat to use several.")
+@click.option(
+    "--device",
+    "devices",
+    multiple=True,
+    metavar="SEL",
+    help="Device: number, id, part of a name, cpu or gpu; see `clrt devices`. Repeat to use several.",
+)
 @grouped("saving", SavingOptions)
 @grouped("display", DisplayOptions)
 @grouped("frames", FrameOptions)
 @grouped("cluster_options", ClusterOptions)
 @verbose_option
 @tracing_options
-def command(scene: Path, camera: str | None, devices: tuple[str, ...], asked: OutputOptions, stop: StopOptions,
-            saving: SavingOptions, display: DisplayOptions, frames: FrameOptions, cluster_options: ClusterOptions,
-            **options: Any) -> None:
+def command(
+    scene: Path,
+    camera: str | None,
+    devices: tuple[str, ...],
+    asked: OutputOptions,
+    stop: StopOptions,
+    saving: SavingOptions,
+    display: DisplayOptions,
+    frames: FrameOptions,
+    cluster_options: ClusterOptions,
+    **options: Any,
+) -> None:
     """Render SCENE until the first of --spp, --time and --error is reached. SCENE is a .toml scene, a Mitsuba scene
     (.xml), a model, or - for a .toml scene on standard input."""
     if click.get_current_context().obj == PROGRAM:
@@ -48,14 +62,24 @@ def command(scene: Path, camera: str | None, devices: tuple[str, ...], asked: Ou
     from ..output.image_library import load_writer
 
     load_writer()
-    job = RenderJob(scene, camera, asked, stop, saving, frames,
-                    cast("RendererOptions", {**options, "device": devices or None}), display.print_kernel)
+    job = RenderJob(
+        scene,
+        camera,
+        asked,
+        stop,
+        saving,
+        frames,
+        cast("RendererOptions", {**options, "device": devices or None}),
+        display.print_kernel,
+    )
     job.check()
     if display.quiet:
         silence()
     local = ClusterOptions()
-    with (make_progress(display.progress_kind, display.quiet) as progress,
-          cluster_for(local if display.print_kernel else cluster_options, progress) as cluster):
+    with (
+        make_progress(display.progress_kind, display.quiet) as progress,
+        cluster_for(local if display.print_kernel else cluster_options, progress) as cluster,
+    ):
         finished = job.run(cluster, progress)
     if not finished:
         sys.exit(INTERRUPTED)

@@ -75,8 +75,18 @@ class RenderJob:
         named = (self.scene,) if asked.reference is None else (self.scene, asked.reference)
         usual = Path("scene.png" if self.scene == STDIN else f"{self.scene.stem}.png")
         files, pipes = split_pipes(asked.outputs or (usual,))
-        return Outputs(named, files, layers, asked.denoise, asked.view, asked.exposure, asked.report, asked.plot,
-                       asked.force, pipes=pipes)
+        return Outputs(
+            named,
+            files,
+            layers,
+            asked.denoise,
+            asked.view,
+            asked.exposure,
+            asked.report,
+            asked.plot,
+            asked.force,
+            pipes=pipes,
+        )
 
     def _sequence(self) -> FrameSequence | None:
         """Return the frames to render; None for a still image."""
@@ -157,7 +167,7 @@ class RenderJob:
             except (DeviceError, OutputError) as failure:
                 advised = type(failure)(f"{failure}{self.saving.advice()}")
                 if interruptible.asked and isinstance(failure, ReaderGoneError):
-                    advised.exit_code = INTERRUPTED     # Ctrl-C ends all programs of a pipeline
+                    advised.exit_code = INTERRUPTED  # Ctrl-C ends all programs of a pipeline
                 raise advised from failure
         if renderer.stop_reason == "interrupted":
             self._advise(renderer.scene.name)
@@ -165,14 +175,22 @@ class RenderJob:
 
     def _advise(self, name: str) -> None:
         """Log how to resume an interrupted render."""
-        logging.getLogger(__name__).warning("%s: interrupted; %s", name, (
-            "run the same command with --resume to render the missing frames" if self.sequence else
-            f"run it with --resume to continue from {self.saving.checkpoint}" if self.saving.checkpoint else
-            "to be able to resume a render, start it with --checkpoint"))
+        logging.getLogger(__name__).warning(
+            "%s: interrupted; %s",
+            name,
+            (
+                "run the same command with --resume to render the missing frames"
+                if self.sequence
+                else f"run it with --resume to continue from {self.saving.checkpoint}"
+                if self.saving.checkpoint
+                else "to be able to resume a render, start it with --checkpoint"
+            ),
+        )
 
 
 def _chosen_aovs(names: tuple[str, ...]) -> tuple[str, ...]:
     from ..rendering.aovs import chosen_aovs
+
     return chosen_aovs(",".join(names))
 
 
@@ -182,16 +200,19 @@ def _open(selectors: Selectors) -> list[Device]:
 
     devices = open_devices(selectors)
     from ..rendering import renderer  # noqa: F401
+
     return devices
 
 
 def _denoiser() -> Denoiser:
     from ..output.denoise import Denoiser
+
     return Denoiser()
 
 
-def _render_frames(renderer: Renderer, sequence: FrameSequence, goal: Goal, denoiser: Denoiser | None,
-                   progress: Progress) -> None:
+def _render_frames(
+    renderer: Renderer, sequence: FrameSequence, goal: Goal, denoiser: Denoiser | None, progress: Progress
+) -> None:
     """Render the remaining frames, each to the goal, and encode the videos."""
     shots = list(sequence.left(renderer.scene, renderer.choices, goal))
     for done, (results, camera) in enumerate(shots):
@@ -203,8 +224,9 @@ def _render_frames(renderer: Renderer, sequence: FrameSequence, goal: Goal, deno
     sequence.join()
 
 
-def render_image(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, denoiser: Denoiser | None,
-                 progress: Progress) -> None:
+def render_image(
+    renderer: Renderer, results: Outputs, goal: Goal, expected: Any, denoiser: Denoiser | None, progress: Progress
+) -> None:
     """Render to the goal, or until interrupted, and write the results; an interrupted frame is not written."""
     guides = renderer.session.guides() if denoiser else {}
     progress.phase("render", device=renderer.name, device_bytes=renderer.session.device_bytes)
@@ -212,12 +234,19 @@ def render_image(renderer: Renderer, results: Outputs, goal: Goal, expected: Any
         progress.workers(renderer.session.shares())
         progress.state(state, goal)
         unfinished = results.header and renderer.stop_reason == "interrupted"
-        if renderer.stop_reason is not None and not unfinished:    # its last checkpoint is written at the same time
+        if renderer.stop_reason is not None and not unfinished:  # its last checkpoint is written at the same time
             _write(renderer, state, results, denoiser, guides, expected, progress)
 
 
-def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoiser | None, guides: Mapping[str, Any],
-           expected: Any, progress: Progress) -> None:
+def _write(
+    renderer: Renderer,
+    state: State,
+    results: Outputs,
+    denoiser: Denoiser | None,
+    guides: Mapping[str, Any],
+    expected: Any,
+    progress: Progress,
+) -> None:
     from ..output.denoise import denoised
     from ..output.image import Image
     from ..rendering.render_report import render_report
@@ -227,8 +256,9 @@ def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoise
     renderer.warnings.log(state.film)
     ratio = state.noise_ratio
     if ratio is not None and not 1 / RIGHT <= ratio <= RIGHT:
-        logging.getLogger(__name__).warning("the estimated error is %.2f times the error against the "
-                                            "reference, which may be noisy itself", ratio)
+        logging.getLogger(__name__).warning(
+            "the estimated error is %.2f times the error against the reference, which may be noisy itself", ratio
+        )
     if denoiser is None:
         results.save(image)
     else:
@@ -248,8 +278,9 @@ def read_reference(path: Path, size: tuple[int, int]) -> Any:
     pixels = read_image(path)
     height, width = pixels.shape[:2]
     if (width, height) != size:
-        raise UsageError(f"{path}: the reference is {width}x{height}, the image {size[0]}x{size[1]}; "
-                         f"use --size {width}x{height}")
+        raise UsageError(
+            f"{path}: the reference is {width}x{height}, the image {size[0]}x{size[1]}; use --size {width}x{height}"
+        )
     try:
         check_reference(pixels, size)
     except UsageError as error:

@@ -20,18 +20,29 @@ def materials_in(scene: Scene) -> list[dict[str, Any]]:
     """Return each material's name, type, and the fields that differ from their defaults, textures apart."""
     rows = []
     for name, material in materials_of(scene).items():
-        given = {each.name: getattr(material, each.name) for each in fields(material)
-                 if getattr(material, each.name) != each.default}
+        given = {
+            each.name: getattr(material, each.name)
+            for each in fields(material)
+            if getattr(material, each.name) != each.default
+        }
         textured = [field for field, value in given.items() if isinstance(value, Texture)]
-        rows.append({"name": name, "type": material.kernel, "set": [each for each in given if each not in textured],
-                     "textured": textured})
+        rows.append(
+            {
+                "name": name,
+                "type": material.kernel,
+                "set": [each for each in given if each not in textured],
+                "textured": textured,
+            }
+        )
     return rows
 
 
 def lights_in(scene: Scene) -> list[dict[str, Any]]:
     """Return the scene's lights, its environment unless black, and each emissive object with its radiance."""
-    rows = [{"type": light.kernel, **{each.name: getattr(light, each.name) for each in fields(light)}}
-            for light in scene.lights]
+    rows = [
+        {"type": light.kernel, **{each.name: getattr(light, each.name) for each in fields(light)}}
+        for light in scene.lights
+    ]
     rows += _environment(scene.environment)
     objects: list[Mesh | Instance | Sphere] = [*scene.meshes, *scene.instances, *scene.spheres]
     for each in objects:
@@ -51,15 +62,22 @@ def _environment(sky: Environment) -> Iterator[dict[str, Any]]:
 
 def material_texts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the lines for `materials_in`."""
-    return _lines(f'"{row["name"]}": ' + ", ".join(
-        [row["type"], *row["set"], *(f"{name} (texture)" for name in row["textured"])]) for row in rows)
+    return _lines(
+        f'"{row["name"]}": ' + ", ".join([row["type"], *row["set"], *(f"{name} (texture)" for name in row["textured"])])
+        for row in rows
+    )
 
 
 def light_texts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the lines for `lights_in`."""
-    return _lines(row["type"] + (f' "{row["name"]}": ' if "name" in row else ": ") + ", ".join(
-        f"{key} {_text(value)}" for key, value in row.items() if key not in ("type", "name") and value is not None)
-                  for row in rows)
+    return _lines(
+        row["type"]
+        + (f' "{row["name"]}": ' if "name" in row else ": ")
+        + ", ".join(
+            f"{key} {_text(value)}" for key, value in row.items() if key not in ("type", "name") and value is not None
+        )
+        for row in rows
+    )
 
 
 def _lines(texts: Iterable[str]) -> list[str]:

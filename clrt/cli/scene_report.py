@@ -24,30 +24,51 @@ def _contents(scene: Scene, compiled: CompiledScene) -> dict[str, Any]:
     materials = {mesh.material for mesh in scene.meshes} | {sphere.material for sphere in scene.spheres}
     materials |= {instance.material or instance.mesh.material for instance in scene.instances}
     return {
-        "scene": scene.name, "size": "x".join(map(str, settings.size)), "spp": settings.spp,
-        "max_depth": settings.max_depth, "integrator": settings.integrator,
-        "meshes": len(scene.meshes), "triangles": sum(len(mesh.faces) for mesh in scene.meshes),
-        "instances": {"entries": len(scene.instances), "in_tree": compiled.instances,
-                      "triangles": sum(len(instance.mesh.faces) for instance in scene.instances)},
-        "spheres": len(scene.spheres), "cameras": list(scene.cameras),
+        "scene": scene.name,
+        "size": "x".join(map(str, settings.size)),
+        "spp": settings.spp,
+        "max_depth": settings.max_depth,
+        "integrator": settings.integrator,
+        "meshes": len(scene.meshes),
+        "triangles": sum(len(mesh.faces) for mesh in scene.meshes),
+        "instances": {
+            "entries": len(scene.instances),
+            "in_tree": compiled.instances,
+            "triangles": sum(len(instance.mesh.faces) for instance in scene.instances),
+        },
+        "spheres": len(scene.spheres),
+        "cameras": list(scene.cameras),
         "materials": dict(Counter(material.kernel for material in materials)),
-        "lights": {"entries": int(compiled.counts["lights"][0]),
-                   **Counter(type(light).kernel for light in scene.lights)}}
+        "lights": {
+            "entries": int(compiled.counts["lights"][0]),
+            **Counter(type(light).kernel for light in scene.lights),
+        },
+    }
 
 
 def _tree(compiled: CompiledScene) -> dict[str, Any]:
     built = compiled.tree
-    return {"layout": built.name, "builder": built.builder, "nodes": built.nodes, "depth": built.depth,
-            "stack": built.stack, "sah_cost": built.sah_cost, "bytes": built.bytes,
-            "build_seconds": built.build_seconds}
+    return {
+        "layout": built.name,
+        "builder": built.builder,
+        "nodes": built.nodes,
+        "depth": built.depth,
+        "stack": built.stack,
+        "sah_cost": built.sah_cost,
+        "bytes": built.bytes,
+        "build_seconds": built.build_seconds,
+    }
 
 
 def _program(scene: Scene, compiled: CompiledScene, aovs: Collection[str]) -> dict[str, Any]:
     film = prod(scene.render.size) * compiled.choices.pixel.itemsize
     report: dict[str, Any] = {
-        "features": compiled.features, "files": compiled.files, "kernel_bytes": len(compiled.source.encode()),
+        "features": compiled.features,
+        "files": compiled.files,
+        "kernel_bytes": len(compiled.source.encode()),
         "buffers": {**{name: array.nbytes for name, (_, array) in compiled.buffers.items()}, "film": film},
-        "bytes": compiled.bytes + film}
+        "bytes": compiled.bytes + film,
+    }
     if seen := seen_first(aovs):
         program = first_hit_program(compiled, seen)[0]
         report["first_hit"] = {"aovs": " ".join(seen), "kernel_bytes": len(program.encode())}

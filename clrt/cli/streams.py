@@ -21,7 +21,7 @@ class _Patient(io.RawIOBase):
 
     def __init__(self, stream: TextIO) -> None:
         self.failure: OSError | None = None
-        self._stream = stream   # otherwise garbage collection would close the file
+        self._stream = stream  # otherwise garbage collection would close the file
         self._raw: Any = getattr(stream.buffer, "raw", stream.buffer)
 
     def write(self, data: ReadableBuffer, /) -> int | None:
@@ -76,8 +76,12 @@ def patient_stdout() -> _Patient:
     sys.stdout.flush()
     encoding = codecs.lookup(sys.stdout.encoding).name
     patient = _Patient(sys.stdout)
-    sys.stdout = io.TextIOWrapper(io.BufferedWriter(patient), "utf-8" if encoding == "ascii" else encoding, AS_BYTES,
-                                  line_buffering=sys.stdout.isatty())
+    sys.stdout = io.TextIOWrapper(
+        io.BufferedWriter(patient),
+        "utf-8" if encoding == "ascii" else encoding,
+        AS_BYTES,
+        line_buffering=sys.stdout.isatty(),
+    )
     return patient
 
 

@@ -13,8 +13,10 @@ def race_table(title: str, kinds: Mapping[str, Any], on_cpu: bool, *, agrees: bo
     the same of processor time; the last column is the fraction of rays for which results agree.
     """
     columns = f"{'rays/s':>9}{'time':>6}" + (f" ({'CPU':>5})" if on_cpu else " " * 8)
-    lines = [f"  {title:24}" + "".join(f"{kind:>23}" for kind in kinds),
-             f"  {'':24}" + columns * len(kinds) + "    agrees" * agrees]
+    lines = [
+        f"  {title:24}" + "".join(f"{kind:>23}" for kind in kinds),
+        f"  {'':24}" + columns * len(kinds) + "    agrees" * agrees,
+    ]
     for name in next(iter(kinds.values())):
         line = f"  {name:24}"
         for kind in kinds.values():

@@ -23,17 +23,27 @@ from .options import CAMERA
 @click.option("--camera", metavar="NAME", help=CAMERA)
 @click.option("--size", type=Size(), help="Image size in pixels.")
 @click.option("--spp", type=click.IntRange(min=1), help="Stop refining at this many samples per pixel.")
-@click.option("--depth", "max_depth", type=click.IntRange(1, 1024),
-              help="Maximum path depth: 1 emission only, 2 direct light, 3 one bounce.")
+@click.option(
+    "--depth",
+    "max_depth",
+    type=click.IntRange(1, 1024),
+    help="Maximum path depth: 1 emission only, 2 direct light, 3 one bounce.",
+)
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random number generator.")
-@click.option("--device", "devices", multiple=True, metavar="SEL",
-              help="Device to use; see `clrt devices`. Repeat to use several.")
+@click.option(
+    "--device",
+    "devices",
+    multiple=True,
+    metavar="SEL",
+    help="Device to use; see `clrt devices`. Repeat to use several.",
+)
 @click.option("--integrator", help="Integrator; default: the scene's.")
 @click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform; see `clrt render`.")
 @click.option("--exposure", default=0.0, metavar="EV", help="In stops.")
 @verbose_option
-def command(scene: Path, camera: str | None, devices: tuple[str, ...], view: str, exposure: float,
-            **given: Any) -> None:
+def command(
+    scene: Path, camera: str | None, devices: tuple[str, ...], view: str, exposure: float, **given: Any
+) -> None:
     """Show SCENE, a .toml scene or a model, in an interactive window: navigate, edit, watch it refine
     (docs/window.md)."""
     if click.get_current_context().obj == PROGRAM:

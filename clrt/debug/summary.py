@@ -58,8 +58,9 @@ def _sources(paths: PixelPaths, names: SceneNames) -> str:
     return f"{', '.join(named)}; {_percent(indirect / total)} of it indirect"
 
 
-def _by_source(rows: NDArray[Any], part: str, light: NDArray[np.float64],
-               names: SceneNames) -> dict[str, NDArray[np.bool_]]:
+def _by_source(
+    rows: NDArray[Any], part: str, light: NDArray[np.float64], names: SceneNames
+) -> dict[str, NDArray[np.bool_]]:
     """Return which rows' light is from which source. An emissive mesh is one, however many triangle lights it has."""
     key = rows["emitter" if part == "emission" else "light"]
     found: dict[str, NDArray[np.bool_]] = {}
@@ -122,9 +123,13 @@ def _ends(paths: PixelPaths, names: SceneNames) -> list[str]:
     ends = Counter(PathEnd(end) for end in paths.rows["end"] if end != PathEnd.NONE)
     absorbing = paths.rows[paths.rows["end"] == PathEnd.ABSORBED]
     materials = _bracketed(_hits(absorbing, names, names.material), "by ")
-    words = {PathEnd.ESCAPED: f"escape, but {_beyond(names)}", PathEnd.DEPTH: "end at the depth limit",
-             PathEnd.ABSORBED: f"are absorbed{materials}", PathEnd.ROULETTE: "are ended by Russian roulette",
-             PathEnd.SIDE: "are scattered to the wrong side of the surface"}
+    words = {
+        PathEnd.ESCAPED: f"escape, but {_beyond(names)}",
+        PathEnd.DEPTH: "end at the depth limit",
+        PathEnd.ABSORBED: f"are absorbed{materials}",
+        PathEnd.ROULETTE: "are ended by Russian roulette",
+        PathEnd.SIDE: "are scattered to the wrong side of the surface",
+    }
     listed = [f"{'all ' * (count == len(paths.starts))}{count} {words[end]}" for end, count in ends.most_common()]
     return [f"paths: {', '.join(listed)}"]
 
@@ -133,8 +138,13 @@ def _beyond(names: SceneNames) -> str:
     return f"no light comes from {names.infinite} there" if names.infinite else "the scene has no environment"
 
 
-def _hits(rows: NDArray[Any], names: SceneNames, name: Callable[[int], str], primitive: str = "primitive",
-          instance: str = "instance") -> Counter[str]:
+def _hits(
+    rows: NDArray[Any],
+    names: SceneNames,
+    name: Callable[[int], str],
+    primitive: str = "primitive",
+    instance: str = "instance",
+) -> Counter[str]:
     """Return how often each object was hit, keyed by what `name` returns for it."""
     return _counted(names.hits(rows[primitive], rows[instance])[0], name)
 

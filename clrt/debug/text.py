@@ -27,27 +27,38 @@ def _place(vertex: Vertex) -> str:
     if vertex.object is None or vertex.position is None or vertex.distance is None:
         return "escaped"
     triangle = "" if vertex.object.startswith("sphere") else f", triangle {vertex.triangle}"
-    bent = ("" if vertex.shading_normal in (None, vertex.geometric_normal)
-            else f", shading normal ({_direction(vertex.shading_normal)})")
+    bent = (
+        ""
+        if vertex.shading_normal in (None, vertex.geometric_normal)
+        else f", shading normal ({_direction(vertex.shading_normal)})"
+    )
     side = "the front" if vertex.front else "behind"
-    return (f"{vertex.object}{triangle}, material {vertex.material}, seen from {side}"
-            f"\n     at ({_numbers(vertex.position)}), distance {vertex.distance:.4g}, normal "
-            f"({_direction(vertex.geometric_normal)}){bent}")
+    return (
+        f"{vertex.object}{triangle}, material {vertex.material}, seen from {side}"
+        f"\n     at ({_numbers(vertex.position)}), distance {vertex.distance:.4g}, normal "
+        f"({_direction(vertex.geometric_normal)}){bent}"
+    )
 
 
 def _emission(emission: Emission) -> str:
     if emission.mis_weight is None:
         return f"none from {emission.source} in this direction"
-    return (f"{emission.source}, radiance {_numbers(emission.radiance)}, MIS weight {emission.mis_weight:.4g}; "
-            f"{_contribution(emission)}")
+    return (
+        f"{emission.source}, radiance {_numbers(emission.radiance)}, MIS weight {emission.mis_weight:.4g}; "
+        f"{_contribution(emission)}"
+    )
 
 
 def _light_sample(light: LightSample) -> Iterator[str]:
-    yield (f"light sample: {light.light}, probability {light.probability:.4g}, direction "
-           f"({_direction(light.direction)}), pdf {light.pdf:.4g}")
-    yield (f"  radiance {_numbers(light.radiance)}, BSDF {_numbers(light.bsdf)}, MIS weight {light.mis_weight:.4g}; "
-           f"{light.outcome}{f' by {light.blocker}' if light.blocker else ''}; "
-           f"{_contribution(light)}")
+    yield (
+        f"light sample: {light.light}, probability {light.probability:.4g}, direction "
+        f"({_direction(light.direction)}), pdf {light.pdf:.4g}"
+    )
+    yield (
+        f"  radiance {_numbers(light.radiance)}, BSDF {_numbers(light.bsdf)}, MIS weight {light.mis_weight:.4g}; "
+        f"{light.outcome}{f' by {light.blocker}' if light.blocker else ''}; "
+        f"{_contribution(light)}"
+    )
 
 
 def _contribution(part: Emission | LightSample) -> str:
@@ -55,8 +66,10 @@ def _contribution(part: Emission | LightSample) -> str:
 
 
 def _bsdf_sample(sample: BsdfSample) -> str:
-    return (f"{'specular ' * sample.specular}direction ({_direction(sample.direction)}), pdf {sample.pdf:.4g}, "
-            f"weight {_numbers(sample.weight)}")
+    return (
+        f"{'specular ' * sample.specular}direction ({_direction(sample.direction)}), pdf {sample.pdf:.4g}, "
+        f"weight {_numbers(sample.weight)}"
+    )
 
 
 def _direction(values: Triple | None) -> str:

@@ -113,8 +113,10 @@ def _check(settings: RenderSettings, pixel: tuple[int, int]) -> None:
     if settings.integrator not in WITH_LIGHT:
         raise UsageError(f'integrator "{settings.integrator}" traces no paths; choose {" or ".join(WITH_LIGHT)}')
     if not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
-        raise UsageError(f"pixel {pixel[0]},{pixel[1]} is outside the image of {width}x{height}; X must be 0 to "
-                         f"{width - 1} and Y 0 to {height - 1}, counted from the upper left corner")
+        raise UsageError(
+            f"pixel {pixel[0]},{pixel[1]} is outside the image of {width}x{height}; X must be 0 to "
+            f"{width - 1} and Y 0 to {height - 1}, counted from the upper left corner"
+        )
 
 
 def _sums(paths: NDArray[Any], used: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -16,8 +16,13 @@ from .trace import PixelPaths
 
 Triple = tuple[float, float, float]
 
-ENDS = {PathEnd.ESCAPED: "escaped", PathEnd.DEPTH: "depth limit", PathEnd.ABSORBED: "absorbed",
-        PathEnd.SIDE: "BSDF sample on the wrong side of the surface", PathEnd.ROULETTE: "Russian roulette"}
+ENDS = {
+    PathEnd.ESCAPED: "escaped",
+    PathEnd.DEPTH: "depth limit",
+    PathEnd.ABSORBED: "absorbed",
+    PathEnd.SIDE: "BSDF sample on the wrong side of the surface",
+    PathEnd.ROULETTE: "Russian roulette",
+}
 
 
 @dataclass(frozen=True)
@@ -93,21 +98,29 @@ class Vertex:
 def vertices(paths: PixelPaths, names: SceneNames, sample: int) -> Iterator[Vertex]:
     """Yield the vertices of a sample's path."""
     start = paths.starts[sample]
-    rows = paths.rows[start:start + paths.lengths[sample]]
+    rows = paths.rows[start : start + paths.lengths[sample]]
     frame, (objects, triangles) = paths.compiled.frame, names.hits(rows["primitive"], rows["instance"])
     blockers, _ = names.hits(rows["blocker"], rows["blocker_instance"])
     for i, (row, outcome) in enumerate(zip(rows, outcomes(rows))):
         hit = row["primitive"] >= 0
         number, triangle = (int(objects[i]), int(triangles[i])) if hit else (None, None)
         yield Vertex(
-            i + 1, None if number is None else names.object(number), number, triangle,
-            None if number is None else names.material(number), bool(row["front"]) if hit else None,
+            i + 1,
+            None if number is None else names.object(number),
+            number,
+            triangle,
+            None if number is None else names.material(number),
+            bool(row["front"]) if hit else None,
             _triple(row["position"].astype(np.float64) / frame.unit + frame.center) if hit else None,
             float(row["distance"]) / frame.unit if hit else None,
-            _triple(row["geometric_normal"]) if hit else None, _triple(row["shading_normal"]) if hit else None,
-            _triple(row["throughput"]), _emission(row, names, number),
-            _light_sample(row, names, outcome, int(blockers[i])) if row["light"] >= 0 else None, _bsdf_sample(row),
-            ENDS.get(PathEnd(row["end"])))
+            _triple(row["geometric_normal"]) if hit else None,
+            _triple(row["shading_normal"]) if hit else None,
+            _triple(row["throughput"]),
+            _emission(row, names, number),
+            _light_sample(row, names, outcome, int(blockers[i])) if row["light"] >= 0 else None,
+            _bsdf_sample(row),
+            ENDS.get(PathEnd(row["end"])),
+        )
 
 
 def mis_weight(row: NDArray[Any]) -> float | None:
@@ -120,16 +133,34 @@ def mis_weight(row: NDArray[Any]) -> float | None:
 
 def _emission(row: NDArray[Any], names: SceneNames, number: int | None) -> Emission | None:
     source = names.infinite if number is None else names.object(number) if row["emitter"] >= 0 else ""
-    return Emission(source, _triple(row["radiance"]), mis_weight(row), float(row["emission_clamp"]),
-                    _triple(row["emission"] * row["emission_clamp"])) if source else None
+    return (
+        Emission(
+            source,
+            _triple(row["radiance"]),
+            mis_weight(row),
+            float(row["emission_clamp"]),
+            _triple(row["emission"] * row["emission_clamp"]),
+        )
+        if source
+        else None
+    )
 
 
 def _light_sample(row: NDArray[Any], names: SceneNames, outcome: str, blocker: int) -> LightSample:
-    return LightSample(names.light(int(row["light"])), float(row["light_probability"]), _triple(row["light_direction"]),
-                       float(row["light_pdf"]), _triple(row["light_radiance"]), _triple(row["light_bsdf"]),
-                       float(row["light_weight"]), str(outcome), names.object(blocker) if blocker >= 0 else None,
-                       _triple(row["unshadowed"]), float(row["direct_clamp"]),
-                       _triple(row["direct"] * row["direct_clamp"]))
+    return LightSample(
+        names.light(int(row["light"])),
+        float(row["light_probability"]),
+        _triple(row["light_direction"]),
+        float(row["light_pdf"]),
+        _triple(row["light_radiance"]),
+        _triple(row["light_bsdf"]),
+        float(row["light_weight"]),
+        str(outcome),
+        names.object(blocker) if blocker >= 0 else None,
+        _triple(row["unshadowed"]),
+        float(row["direct_clamp"]),
+        _triple(row["direct"] * row["direct_clamp"]),
+    )
 
 
 def _bsdf_sample(row: NDArray[Any]) -> BsdfSample | None:

@@ -67,8 +67,7 @@ class Device:
     @property
     def fuses(self) -> bool:
         """Return whether fma is a hardware instruction. Intel's runtime and Oclgrind have it without reporting it."""
-        return (self.vectors or self.info.type == "simulator"
-                or bool(self.cl.single_fp_config & cl.device_fp_config.FMA))
+        return self.vectors or self.info.type == "simulator" or bool(self.cl.single_fp_config & cl.device_fp_config.FMA)
 
     @property
     def local_size(self) -> int:

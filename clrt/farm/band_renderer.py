@@ -54,7 +54,7 @@ def render(key: str, order: PictureOrder) -> dict[str, Any]:
     state = None
     for state in renderer.passes(spp=order.spp, time=order.time, error=order.error):
         pass
-    assert state is not None    # there is at least one pass
+    assert state is not None  # there is at least one pass
     image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))
     if denoiser is not None:
         image = denoised(image, denoiser, guides)

@@ -37,8 +37,16 @@ HUGE = 1 << 23
 BAND_PIXELS = 1 << 20
 BYTES = 12
 #: Fields of a band's report that do not apply to the image.
-OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise", "clamped_part", "brightest",
-          "light"}
+OF_ONE = {
+    "seconds",
+    "samples_per_second",
+    "rays_per_second",
+    "stop_reason",
+    "tile_noise",
+    "clamped_part",
+    "brightest",
+    "light",
+}
 #: Fields of an order that are separate facts, or differ from band to band.
 COMMON = {"scene", "options", "camera", "band"}
 
@@ -76,11 +84,18 @@ class BandedPicture:
         except OSError as error:
             raise OutputError(f"{self.rows_path}: cannot be written ({error.strerror})") from error
         try:
-            self.reports = {name: about["report"] for name, about in manifest.done.items()
-                            if name in bands and self._is_there(file, bands[name], about)}
+            self.reports = {
+                name: about["report"]
+                for name, about in manifest.done.items()
+                if name in bands and self._is_there(file, bands[name], about)
+            }
             names = [name for name in bands if name not in self.reports]
-            pictures = WholePictures(cluster, names, lambda name: replace(self.order, band=bands[name]),
-                                     tuple(self.order.options.get("device") or ()))
+            pictures = WholePictures(
+                cluster,
+                names,
+                lambda name: replace(self.order, band=bands[name]),
+                tuple(self.order.options.get("device") or ()),
+            )
             for result in pictures.results():
                 if result is not None:
                     self._keep(file, manifest, bands[result[0]], *result)
@@ -102,8 +117,10 @@ class BandedPicture:
     def summary(self) -> dict[str, Any]:
         """Combine the reports of all bands: samples, rays and noise; time is the sum of the workers'."""
         reports = list(self.reports.values())
-        added = {name: sum(report[name] for report in reports)
-                 for name in ("samples", "rays", "nonfinite_samples", "seconds")}
+        added = {
+            name: sum(report[name] for report in reports)
+            for name in ("samples", "rays", "nonfinite_samples", "seconds")
+        }
         squares = [report["samples"] / report["spp"] * report["noise"] ** 2 for report in reports if report["noise"]]
         pixels = self.size[0] * self.size[1]
         first = {name: value for name, value in (reports[0] if reports else {}).items() if name not in OF_ONE}
@@ -114,34 +131,52 @@ class BandedPicture:
             first["clamped_part"] = _clamped_part(reports)
         if len(reports) > 1:
             first["warnings"] = [*first["warnings"], *self._warnings(reports)]
-        return {**first, "width": self.size[0], "height": self.size[1], "bands": len(reports),
-                "samples": added["samples"], "rays": added["rays"], "nonfinite_samples": added["nonfinite_samples"],
-                "worker_seconds": added["seconds"], "spp": round(added["samples"] / pixels),
-                "noise": float(np.sqrt(sum(squares) / pixels)) if len(squares) == len(reports) else None}
+        return {
+            **first,
+            "width": self.size[0],
+            "height": self.size[1],
+            "bands": len(reports),
+            "samples": added["samples"],
+            "rays": added["rays"],
+            "nonfinite_samples": added["nonfinite_samples"],
+            "worker_seconds": added["seconds"],
+            "spp": round(added["samples"] / pixels),
+            "noise": float(np.sqrt(sum(squares) / pixels)) if len(squares) == len(reports) else None,
+        }
 
     def _warnings(self, reports: list[dict[str, Any]]) -> list[str]:
         """Return warnings about the whole image; each band's report already has those about the scene."""
         settings = self.order.settled.render
         dropped, samples = (sum(report[name] for report in reports) for name in ("nonfinite_samples", "samples"))
-        return [*nonfinite_warnings(dropped, samples),
-                *bias_warnings(settings, _clamped_part(reports)),
-                *black_warnings(settings, reports[0]["kernel"]["features"],
-                                max(report["brightest"] for report in reports), DARK)]
+        return [
+            *nonfinite_warnings(dropped, samples),
+            *bias_warnings(settings, _clamped_part(reports)),
+            *black_warnings(
+                settings, reports[0]["kernel"]["features"], max(report["brightest"] for report in reports), DARK
+            ),
+        ]
 
     def _bands(self) -> dict[str, tuple[int, int]]:
         """Return the tile rows of each band by name; all begin at a block of an .exr file."""
         rows, each = tiles_of(self.size)[0], BLOCK_ROWS // TILE
         step = each * max(1, self.band_pixels // (self.size[0] * BLOCK_ROWS))
-        return {f"rows {first * TILE} to {min((first + step) * TILE, self.size[1])}": (first, min(rows, first + step))
-                for first in range(0, rows, step)}
+        return {
+            f"rows {first * TILE} to {min((first + step) * TILE, self.size[1])}": (first, min(rows, first + step))
+            for first in range(0, rows, step)
+        }
 
     def _facts(self) -> dict[str, str]:
         """Return the facts that identify the render, including its stopping criteria, as each band stops by itself."""
         order = self.order
-        others = {"band_pixels": self.band_pixels, **beyond(order.options),
-                  **{each.name: getattr(order, each.name) for each in fields(order) if each.name not in COMMON}}
-        return {**facts_of(order.settled, order.choices),
-                **{name: str(value) for name, value in others.items() if name != "device"}}
+        others = {
+            "band_pixels": self.band_pixels,
+            **beyond(order.options),
+            **{each.name: getattr(order, each.name) for each in fields(order) if each.name not in COMMON},
+        }
+        return {
+            **facts_of(order.settled, order.choices),
+            **{name: str(value) for name, value in others.items() if name != "device"},
+        }
 
     def _span(self, band: tuple[int, int]) -> tuple[int, int]:
         """Return a band's offset in the file, and its size in bytes."""
@@ -181,7 +216,8 @@ class BandedPicture:
 
 def _clamped_part(reports: list[dict[str, Any]]) -> float:
     """Return the fraction of all light that clamping removed, from the bands' fractions and remaining light."""
-    removed = sum(report["light"] * part / (1 - part) for report in reports
-                  if (part := report.get("clamped_part", 0.0)))
+    removed = sum(
+        report["light"] * part / (1 - part) for report in reports if (part := report.get("clamped_part", 0.0))
+    )
     light = sum(report["light"] for report in reports)
     return removed / (removed + light) if removed else 0.0

@@ -63,8 +63,10 @@ class Cluster:
                 warnings.simplefilter("ignore")
                 return Client(self._local or self.address, timeout=ANSWER, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
-            raise DeviceError(f"the scheduler at {self.address} does not answer ({error}); start it with `dask "
-                              "scheduler`, and use the address that it prints, not the dashboard's") from error
+            raise DeviceError(
+                f"the scheduler at {self.address} does not answer ({error}); start it with `dask "
+                "scheduler`, and use the address that it prints, not the dashboard's"
+            ) from error
 
     @property
     def alive(self) -> bool:
@@ -73,7 +75,7 @@ class Cluster:
 
     def reconnect(self) -> bool:
         """Return whether a scheduler answers at the address again. What was sent to the previous one is lost."""
-        with suppress(Exception):   # the connection is already broken
+        with suppress(Exception):  # the connection is already broken
             self._client.close(timeout=1)
         try:
             self._client = self._connect()
@@ -174,7 +176,7 @@ class Cluster:
         """Return what the logs say about worker processes that ended recently."""
         try:
             logs = self._client.get_worker_logs(n=50, nanny=True)
-        except Exception:    # only a hint for the user, which may fail in any way
+        except Exception:  # only a hint for the user, which may fail in any way
             return ""
         lines = [line for entries in logs.values() for _, line in entries if any(word in line for word in LAST_WORDS)]
         return f" ({lines[0].strip().splitlines()[-1]})" if lines else ""
@@ -200,8 +202,8 @@ async def _fetched(client: Client, future: Future[Any]) -> Any:
     `Client.gather` batches requests, so one worker that hangs would hold back the results of all others.
     """
     if future.status != "finished":
-        return await client.gather(future, asynchronous=True)    # raises the task's error
-    assert client.scheduler is not None    # while it is connected
+        return await client.gather(future, asynchronous=True)  # raises the task's error
+    assert client.scheduler is not None  # while it is connected
     found = await client.scheduler.gather(keys=[future.key])
     if found["status"] != "OK":
         raise ConnectionError("its worker no longer has it")
@@ -212,8 +214,10 @@ def connect(address: str) -> Cluster:
     """Connect to the scheduler at tcp://… or tls://…, with the certificates from Dask's settings."""
     _check_dask()
     if "://" not in address or not address.partition("://")[2]:
-        raise UsageError(f"--scheduler {address}: is not an address; write tcp://HOST:PORT or tls://HOST:PORT, as the "
-                         "scheduler prints it")
+        raise UsageError(
+            f"--scheduler {address}: is not an address; write tcp://HOST:PORT or tls://HOST:PORT, as the "
+            "scheduler prints it"
+        )
     return Cluster(address)
 
 
@@ -230,9 +234,16 @@ def local_cluster(count: int) -> Cluster:
     threads = max(1, (os.cpu_count() or 1) // count)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        local = LocalCluster(n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
-                             worker_dashboard_address=None, security=True, silence_logs=logging.ERROR,
-                             env={"POCL_MAX_PTHREAD_COUNT": str(threads)})
+        local = LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            worker_dashboard_address=None,
+            security=True,
+            silence_logs=logging.ERROR,
+            env={"POCL_MAX_PTHREAD_COUNT": str(threads)},
+        )
     return Cluster(local.scheduler_address, local)
 
 
@@ -245,5 +256,5 @@ def _check_dask() -> None:
         raise UsageError("rendering on workers needs Dask: pip install distributed cryptography") from None
     # By default each connection keeps its last thousand messages with their contents.
     dask.config.set({"distributed.admin.low-level-log-length": LOG_LENGTH})
-    for name in ("distributed", "distributed.client"):    # Dask sets a level for the latter
+    for name in ("distributed", "distributed.client"):  # Dask sets a level for the latter
         logging.getLogger(name).setLevel(logging.CRITICAL)

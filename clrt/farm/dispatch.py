@@ -128,12 +128,15 @@ class Dispatch:
         elif not self._alone_since:
             self._alone_since = now
         elif now - self._alone_since > HOPELESS:
-            raise DeviceError(f"no worker of {self.cluster.address} has answered for {HOPELESS:g} s; start some with "
-                              f"`dask worker {self.cluster.address}` where the same clrt is installed")
+            raise DeviceError(
+                f"no worker of {self.cluster.address} has answered for {HOPELESS:g} s; start some with "
+                f"`dask worker {self.cluster.address}` where the same clrt is installed"
+            )
         elif now - self._alone_since > LONELY and not self._told_alone:
             self._told_alone = True
-            _log.warning("%s has %s; waiting", self.cluster.address,
-                         "workers, none of which is ready" if hopes else "no worker")
+            _log.warning(
+                "%s has %s; waiting", self.cluster.address, "workers, none of which is ready" if hopes else "no worker"
+            )
 
     def _part_with(self, member: WorkerState) -> None:
         """Remove a lost worker; the task that it was running may be the cause."""
@@ -145,9 +148,11 @@ class Dispatch:
             run.task.runs.remove(run)
             run.task.deaths += place == 0
             if run.task.deaths >= MOST_DEATHS:
-                raise DeviceError(f"{run.task.name} has killed {run.task.deaths} workers, last {member.name}"
-                                  f"{self.cluster.last_words()}; see their logs, and run `clrt devices "
-                                  "--check` there")
+                raise DeviceError(
+                    f"{run.task.name} has killed {run.task.deaths} workers, last {member.name}"
+                    f"{self.cluster.last_words()}; see their logs, and run `clrt devices "
+                    "--check` there"
+                )
             self._repeat(run.task)
         for key in [key for key, run in self._runs.items() if run.member is member]:
             del self._runs[key]
@@ -178,9 +183,10 @@ class Dispatch:
             return []
         usual, now = sum(rates) / len(rates), time.perf_counter()
         alone = [task.runs[0] for task in self.tasks if len(task.runs) == 1]
-        return sorted((run for run in alone
-                       if now - run.began > SLOW * run.ahead / (run.member.rate or usual) + SLACK),
-                      key=lambda run: run.began)
+        return sorted(
+            (run for run in alone if now - run.began > SLOW * run.ahead / (run.member.rate or usual) + SLACK),
+            key=lambda run: run.began,
+        )
 
     def _begin(self, task: Task, member: WorkerState) -> None:
         key = f"clrt-{uuid4().hex}"
@@ -209,10 +215,10 @@ class Dispatch:
             member.facts = result.result().result()
             self._source.meet(member)
         except LOST:
-            self.members.pop(member.address, None)    # to be introduced again if it is still there
+            self.members.pop(member.address, None)  # to be introduced again if it is still there
         except SceneError:
             raise
-        except Exception as error:   # any error is the worker's
+        except Exception as error:  # any error is the worker's
             self._refuse(member, error)
 
     def _refuse(self, member: WorkerState, error: Exception) -> None:
@@ -228,7 +234,7 @@ class Dispatch:
         member.work -= task.work
         member.silent = False
         if run not in task.runs:
-            return     # another worker was faster, or the task was cancelled
+            return  # another worker was faster, or the task was cancelled
         task.runs.remove(run)
         try:
             found, seconds = result.result().result()

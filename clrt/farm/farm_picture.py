@@ -76,8 +76,13 @@ class FarmAccumulation(Accumulation):
     def machine(self, devices: Sequence[Device]) -> dict[str, Any]:
         """Return the report's data on the workers; for data on builds, that of one of them."""
         reports = [each.facts["report"] for each in self.dispatch.everyone() if each.facts]
-        return {**reports[0], "platform": self.told("platform"), "driver": self.told("driver"),
-                "moved_bytes": self.moved_bytes, "devices": self.shares()}
+        return {
+            **reports[0],
+            "platform": self.told("platform"),
+            "driver": self.told("driver"),
+            "moved_bytes": self.moved_bytes,
+            "devices": self.shares(),
+        }
 
     def told(self, what: str) -> str:
         """Return the distinct values of a field in the workers' answers."""
@@ -121,18 +126,23 @@ class FarmAccumulation(Accumulation):
         left = self.work.left + (self._ahead.work.left if self._ahead.work else 0)
         fair = left * TILE_PIXELS / max(1, len(rates)) / 2
         most = evenly(int(min(size, max(fair, size / SMALLEST)) / TILE_PIXELS), self.work)
-        found = self._ahead.cut(self.work, most, FEWEST_TILES, MOST_TILES,
-                                [task.what[1] for task in self.dispatch.tasks])
+        found = self._ahead.cut(
+            self.work, most, FEWEST_TILES, MOST_TILES, [task.what[1] for task in self.dispatch.tasks]
+        )
         if found is None:
             return None
         work, part = found
-        tiles = work.tiles[part.first:part.end]
+        tiles = work.tiles[part.first : part.end]
         pixels = self._ahead.film[tiles] if part.samples else None
         self.moved_bytes += tiles.nbytes + (0 if pixels is None else pixels.nbytes)
         name = f"a task of {len(tiles)} tiles, samples {part.samples} to {part.samples + part.more}"
-        return Task((work, part, tiles), name,
-                    len(tiles) * TILE_PIXELS * part.more, render_share,
-                    lambda: (self._parcel.key, tiles, part.samples, part.more, pixels))
+        return Task(
+            (work, part, tiles),
+            name,
+            len(tiles) * TILE_PIXELS * part.more,
+            render_share,
+            lambda: (self._parcel.key, tiles, part.samples, part.more, pixels),
+        )
 
     def accept(self, task: Task, result: NDArray[Any], member: WorkerState) -> None:
         """Store the pixels in the film if they are plausible."""
@@ -230,9 +240,17 @@ class FarmAccumulation(Accumulation):
 
     def shares(self) -> list[dict[str, Any]]:
         """Return each worker's samples and speed."""
-        return [{"worker": each.name, "device": (each.facts or {}).get("name"), "samples": each.done,
-                 "samples_per_second": each.rate, "lost": each.gone or bool(each.refused)}
-                for each in self.dispatch.everyone() if each.facts]
+        return [
+            {
+                "worker": each.name,
+                "device": (each.facts or {}).get("name"),
+                "samples": each.done,
+                "samples_per_second": each.rate,
+                "lost": each.gone or bool(each.refused),
+            }
+            for each in self.dispatch.everyone()
+            if each.facts
+        ]
 
     @property
     def scene(self) -> SceneOnDevice:
@@ -242,8 +260,9 @@ class FarmAccumulation(Accumulation):
     @property
     def device_bytes(self) -> int:
         """Return the size of all buffers on the worker that uses most."""
-        return max((each.facts["report"]["peak_device_bytes"] for each in self.dispatch.everyone() if each.facts),
-                   default=0)
+        return max(
+            (each.facts["report"]["peak_device_bytes"] for each in self.dispatch.everyone() if each.facts), default=0
+        )
 
     @property
     def longest_launch(self) -> float:

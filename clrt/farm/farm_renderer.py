@@ -31,13 +31,20 @@ class FarmRenderer(Renderer):
     simulated: samples per second of workers that only sleep, to measure the overhead (simulated.py).
     """
 
-    def __init__(self, scene: Scene, cluster: Cluster, *, simulated: float | None = None,
-                 **options: Unpack[RendererOptions]) -> None:
+    def __init__(
+        self, scene: Scene, cluster: Cluster, *, simulated: float | None = None, **options: Unpack[RendererOptions]
+    ) -> None:
         self._cluster, self._simulated = cluster, simulated
         super().__init__(scene, **options)
 
-    def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
-               reference: NDArray[np.float32] | None = None) -> Iterator[State]:
+    def passes(
+        self,
+        *,
+        spp: int | None = None,
+        time: float | None = None,
+        error: float | None = None,
+        reference: NDArray[np.float32] | None = None,
+    ) -> Iterator[State]:
         """See `Renderer.passes`. If the cluster fails, the samples so far are kept in the checkpoint."""
         try:
             yield from super().passes(spp=spp, time=time, error=error, reference=reference)

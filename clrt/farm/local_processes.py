@@ -33,9 +33,22 @@ class Processes:
         """Start `count` more workers, which are not restarted. preload: a module to load; variables: environment."""
         loaded = [] if preload is None else ["--preload", str(preload)]
         for _ in range(count):
-            self.workers.append(self._start("distributed.cli.dask_worker", self.address, "--nthreads", "1",
-                                            "--no-dashboard", "--no-nanny", "--host", "127.0.0.1", "--death-timeout",
-                                            "60", *loaded, **variables))
+            self.workers.append(
+                self._start(
+                    "distributed.cli.dask_worker",
+                    self.address,
+                    "--nthreads",
+                    "1",
+                    "--no-dashboard",
+                    "--no-nanny",
+                    "--host",
+                    "127.0.0.1",
+                    "--death-timeout",
+                    "60",
+                    *loaded,
+                    **variables,
+                )
+            )
 
     def add_simulated(self, count: int) -> None:
         """Start a process with `count` simulated workers (simulated.py)."""
@@ -50,13 +63,23 @@ class Processes:
 
     def _start(self, module: str, *arguments: str, **variables: str) -> subprocess.Popen[bytes]:
         log = open(self._folder / f"{module}-{time.monotonic_ns()}.log", "wb")
-        environment = {**os.environ, "POCL_MAX_PTHREAD_COUNT": "1",
-                       "DASK_DISTRIBUTED__ADMIN__LOW_LEVEL_LOG_LENGTH": str(LOG_LENGTH),
-                       "DASK_TEMPORARY_DIRECTORY": str(self._folder),
-                       "PYTHONPATH": os.pathsep.join(sys.path), **variables}
-        return subprocess.Popen([sys.executable, "-m", module, *arguments], env=environment,
-                                stdin=subprocess.DEVNULL, stdout=log, stderr=log, cwd=self._folder,
-                                start_new_session=True)
+        environment = {
+            **os.environ,
+            "POCL_MAX_PTHREAD_COUNT": "1",
+            "DASK_DISTRIBUTED__ADMIN__LOW_LEVEL_LOG_LENGTH": str(LOG_LENGTH),
+            "DASK_TEMPORARY_DIRECTORY": str(self._folder),
+            "PYTHONPATH": os.pathsep.join(sys.path),
+            **variables,
+        }
+        return subprocess.Popen(
+            [sys.executable, "-m", module, *arguments],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            cwd=self._folder,
+            start_new_session=True,
+        )
 
     def __enter__(self) -> Processes:
         """Wait until the scheduler listens, which takes long on a busy machine."""
@@ -67,8 +90,9 @@ class Processes:
             time.sleep(0.05)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         for process in [*self.workers, self.scheduler]:
             with suppress(ProcessLookupError):
                 if sys.platform == "win32":

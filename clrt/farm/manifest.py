@@ -59,7 +59,7 @@ class Manifest:
     def _read(self, facts: dict[str, str]) -> int:
         """Read the complete lines, and return their size in bytes."""
         content = self.path.read_bytes()
-        lines = content[:content.rfind(b"\n") + 1].splitlines(keepends=True)
+        lines = content[: content.rfind(b"\n") + 1].splitlines(keepends=True)
         try:
             first, *entries = [json.loads(line) for line in lines]
             found = first["facts"] if first["manifest"] == VERSION else None
@@ -67,9 +67,13 @@ class Manifest:
         except (ValueError, TypeError, LookupError):
             found = None
         if not isinstance(found, dict):
-            raise CheckpointError(f"{self.path}: is not a list of images that this version of clrt can read; choose "
-                                  "another file, or leave out --resume to start afresh")
+            raise CheckpointError(
+                f"{self.path}: is not a list of images that this version of clrt can read; choose "
+                "another file, or leave out --resume to start afresh"
+            )
         if others := differences(found, facts):
-            raise CheckpointError(f"{self.path}: is of another render ({', '.join(others)}); use its settings to "
-                                  "resume it, choose another file, or leave out --resume to start afresh")
+            raise CheckpointError(
+                f"{self.path}: is of another render ({', '.join(others)}); use its settings to "
+                "resume it, choose another file, or leave out --resume to start afresh"
+            )
         return sum(map(len, lines))

@@ -30,15 +30,21 @@ class NextPass:
         """Plan the next pass: `samples` more for every pixel after the current work."""
         self.work, self.samples = WorkQueue(work.then), samples
         self.work.add_to_all(samples)
-        self._before = np.zeros_like(self.film)    # uses memory only where it is written to
+        self._before = np.zeros_like(self.film)  # uses memory only where it is written to
         self._begun = np.zeros(len(self.film), bool)
 
     def begin(self) -> None:
         """Make the planned pass the current one."""
         self.work = None
 
-    def cut(self, work: WorkQueue, most: int, least_tiles: int, most_tiles: int, busy: Sequence[WorkPart],
-            ) -> tuple[WorkQueue, WorkPart] | None:
+    def cut(
+        self,
+        work: WorkQueue,
+        most: int,
+        least_tiles: int,
+        most_tiles: int,
+        busy: Sequence[WorkPart],
+    ) -> tuple[WorkQueue, WorkPart] | None:
         """Take the next part of the current work, or of the pass after it (see `WorkQueue.cut`)."""
         if part := work.cut(most, least_tiles, most_tiles, None, busy):
             return work, part

@@ -46,8 +46,9 @@ class PictureOrder:
     @property
     def settled(self) -> Scene:
         """Return the scene with those options applied that are render settings."""
-        return replace(self.scene, camera=self.camera or self.scene.camera,
-                       render=settings_of(self.scene.render, self.options))
+        return replace(
+            self.scene, camera=self.camera or self.scene.camera, render=settings_of(self.scene.render, self.options)
+        )
 
     @property
     def choices(self) -> Choices:

@@ -20,7 +20,7 @@ def check_scheduler(address: str, seconds: float) -> None:
         try:
             asyncio.run(asyncio.wait_for(_check_kind(address), seconds))
             outcome.append(None)
-        except BaseException as error:    # raised again below
+        except BaseException as error:  # raised again below
             outcome.append(error)
         ended.set()
 
@@ -31,7 +31,7 @@ def check_scheduler(address: str, seconds: float) -> None:
         raise OSError(f"no answer within {seconds:g} s") from error
     if isinstance(error, OSError | ValueError | TypeError):
         raise error
-    if error is not None:    # Dask may raise any error on another protocol's bytes
+    if error is not None:  # Dask may raise any error on another protocol's bytes
         raise OSError("its answer is not a scheduler's") from error
 
 

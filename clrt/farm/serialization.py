@@ -27,10 +27,18 @@ LARGE = 1 << 14
 HERE = "a file"
 #: Classes that a pickle may name: the dataclasses of these modules, and single names.
 ROOMS = ("clrt.scene.", "clrt.accel.methods", "clrt.rendering.compile.choices", "clrt.farm.orders")
-NAMES = {("numpy", "ndarray"), ("numpy", "dtype"), ("collections", "OrderedDict"), ("builtins", "complex"),
-         *((f"numpy.{core}", name) for core in ("core.multiarray", "_core.multiarray")
-           for name in ("_reconstruct", "scalar")),
-         *((f"numpy.{core}", "_frombuffer") for core in ("core.numeric", "_core.numeric"))}
+NAMES = {
+    ("numpy", "ndarray"),
+    ("numpy", "dtype"),
+    ("collections", "OrderedDict"),
+    ("builtins", "complex"),
+    *(
+        (f"numpy.{core}", name)
+        for core in ("core.multiarray", "_core.multiarray")
+        for name in ("_reconstruct", "scalar")
+    ),
+    *((f"numpy.{core}", "_frombuffer") for core in ("core.numeric", "_core.numeric")),
+}
 
 Arrays = dict[str, NDArray[Any]]
 

@@ -49,7 +49,7 @@ class ShareRenderer:
     def proof(self) -> NDArray[Any]:
         """Render one sample of a few tiles from all over the image, to compare with other workers'."""
         tiles = scattered(self._picture.tile_samples.size).astype(np.uint32)
-        return self.share(np.sort(tiles[::max(1, len(tiles) // PROOF_TILES)][:PROOF_TILES]), 0, 1, None)
+        return self.share(np.sort(tiles[:: max(1, len(tiles) // PROOF_TILES)][:PROOF_TILES]), 0, 1, None)
 
     def drawn(self, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
         """See `remote.draw`."""

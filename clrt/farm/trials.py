@@ -53,10 +53,17 @@ def equality(scenes: list[Scene], spp: int) -> Iterator[Row]:
                 together = FarmRenderer(scene, cluster, spp=spp)
                 together.session.dispatch.wait_for(count)
                 found = _run(together, spp)
-                yield {"trial": "equality", "scene": scene.name, "workers": name, "spp": spp,
-                       "equal": same_film(last, found), "same_noise": last.noise == found.noise,
-                       "seconds": together.seconds, "seconds_alone": alone.seconds,
-                       "bytes_a_sample": together.session.moved_bytes / found.film.samples}
+                yield {
+                    "trial": "equality",
+                    "scene": scene.name,
+                    "workers": name,
+                    "spp": spp,
+                    "equal": same_film(last, found),
+                    "same_noise": last.noise == found.noise,
+                    "seconds": together.seconds,
+                    "seconds_alone": alone.seconds,
+                    "bytes_a_sample": together.session.moved_bytes / found.film.samples,
+                }
 
 
 def animation(scene: Scene, count: int, spp: int) -> Iterator[Row]:
@@ -73,9 +80,15 @@ def animation(scene: Scene, count: int, spp: int) -> Iterator[Row]:
             pictures.dispatch.wait_for(workers)
             start = time.perf_counter()
             found = dict(filter(None, pictures.results()))
-            yield {"trial": "animation", "scene": scene.name, "workers": named, "frames": len(found), "spp": spp,
-                   "equal": all(np.array_equal(alone[name], found[name]["pixels"]) for name in shots),
-                   "seconds": time.perf_counter() - start}
+            yield {
+                "trial": "animation",
+                "scene": scene.name,
+                "workers": named,
+                "frames": len(found),
+                "spp": spp,
+                "equal": all(np.array_equal(alone[name], found[name]["pixels"]) for name in shots),
+                "seconds": time.perf_counter() - start,
+            }
 
 
 def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
@@ -101,8 +114,14 @@ def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
             stop.set()
             if killing:
                 killer.join()
-            yield {"trial": "kills", "scene": scene.name, "killed": len(killed), "seconds": together.seconds,
-                   "equal": same_film(alone, found), "same_noise": alone.noise == found.noise}
+            yield {
+                "trial": "kills",
+                "scene": scene.name,
+                "killed": len(killed),
+                "seconds": together.seconds,
+                "equal": same_film(alone, found),
+                "same_noise": alone.noise == found.noise,
+            }
 
 
 def overhead(scene: Scene, workers: int, seconds: float) -> Row:
@@ -117,28 +136,46 @@ def overhead(scene: Scene, workers: int, seconds: float) -> Row:
         start, scheduler = time.process_time(), psutil.Process(processes.scheduler.pid)
         before = sum(scheduler.cpu_times()[:2])
         film = _run(together, spp).film
-        return {"trial": "overhead", "workers": workers, "spp": spp, "seconds": together.seconds,
-                "efficiency": film.samples / (workers * SPEED * together.seconds),
-                "bytes_a_sample": together.session.moved_bytes / film.samples,
-                "tasks": together.session.dispatch.sent,
-                "client_seconds": time.process_time() - start,
-                "scheduler_seconds": sum(scheduler.cpu_times()[:2]) - before, "client_bytes": peak_bytes()}
+        return {
+            "trial": "overhead",
+            "workers": workers,
+            "spp": spp,
+            "seconds": together.seconds,
+            "efficiency": film.samples / (workers * SPEED * together.seconds),
+            "bytes_a_sample": together.session.moved_bytes / film.samples,
+            "tasks": together.session.dispatch.sent,
+            "client_seconds": time.process_time() - start,
+            "scheduler_seconds": sum(scheduler.cpu_times()[:2]) - before,
+            "client_bytes": peak_bytes(),
+        }
 
 
 def huge(scene: Scene, size: tuple[int, int], spp: int, workers: int, path: Path) -> Row:
     """Render a large image of normals, which are cheap, in bands, and measure the client's peak memory."""
-    with tempfile.TemporaryDirectory(dir=".") as folder, farm(workers) as processes, \
-            connect(processes.address) as cluster:
-        banded = BandedPicture(PictureOrder(scene, {"size": size, "integrator": "normals"}, spp=spp),
-                               Path(folder) / "huge.bands")
+    with (
+        tempfile.TemporaryDirectory(dir=".") as folder,
+        farm(workers) as processes,
+        connect(processes.address) as cluster,
+    ):
+        banded = BandedPicture(
+            PictureOrder(scene, {"size": size, "integrator": "normals"}, spp=spp), Path(folder) / "huge.bands"
+        )
         start = time.perf_counter()
         for _ in banded.render(cluster):
             pass
         rendered = time.perf_counter() - start
         banded.save(path, "srgb", 0.0, {})
-        return {"trial": "huge", "size": f"{size[0]}x{size[1]}", "spp": spp, "workers": workers, "seconds": rendered,
-                "writing_seconds": time.perf_counter() - start - rendered, "file_bytes": path.stat().st_size,
-                "samples": banded.summary()["samples"], "client_bytes": peak_bytes()}
+        return {
+            "trial": "huge",
+            "size": f"{size[0]}x{size[1]}",
+            "spp": spp,
+            "workers": workers,
+            "seconds": rendered,
+            "writing_seconds": time.perf_counter() - start - rendered,
+            "file_bytes": path.stat().st_size,
+            "samples": banded.summary()["samples"],
+            "client_bytes": peak_bytes(),
+        }
 
 
 def sized(scene: Scene, size: tuple[int, int]) -> Scene:
@@ -153,4 +190,4 @@ def same_film(one: State, other: State) -> bool:
 
 
 def _run(renderer: Renderer, spp: int) -> State:
-    return deque(renderer.passes(spp=spp), maxlen=1).pop()    # keeps only the last state in memory
+    return deque(renderer.passes(spp=spp), maxlen=1).pop()  # keeps only the last state in memory

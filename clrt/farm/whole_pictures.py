@@ -26,8 +26,13 @@ PLENTY = 3
 class WholePictures:
     """Images by name. order: returns a worker's order for a name; the results are those of `band_renderer.render`."""
 
-    def __init__(self, cluster: Cluster, names: Sequence[str], order: Callable[[str], PictureOrder],
-                 devices: tuple[str | int, ...] = ()) -> None:
+    def __init__(
+        self,
+        cluster: Cluster,
+        names: Sequence[str],
+        order: Callable[[str], PictureOrder],
+        devices: tuple[str | int, ...] = (),
+    ) -> None:
         self._names, self._order, self._devices = list(reversed(names)), order, devices
         self._results: list[tuple[str, dict[str, Any]]] = []
         self._common: tuple[PictureOrder, Serialized] | None = None
@@ -67,8 +72,13 @@ class WholePictures:
         order, cluster = self._order(name), self.dispatch.cluster
         parcel, part = self._packed(replace(order, camera=None, band=None)), pack((order.camera, order.band)).text
         cluster.keep_only({*parcel.arrays}.union(*(task.what[1] for task in self.dispatch.tasks)))
-        return Task((name, set(parcel.arrays)), name, 1.0, render_whole, lambda: (
-            identity(), parcel.key, parcel.text, part, list(parcel.arrays), *cluster.put(parcel.arrays)))
+        return Task(
+            (name, set(parcel.arrays)),
+            name,
+            1.0,
+            render_whole,
+            lambda: (identity(), parcel.key, parcel.text, part, list(parcel.arrays), *cluster.put(parcel.arrays)),
+        )
 
     def _packed(self, order: PictureOrder) -> Serialized:
         """Pack what most orders have in common, once for all of them."""

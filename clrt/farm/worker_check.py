@@ -39,18 +39,27 @@ class WorkerCheck:
         if kind in self._kinds:
             other, expected = self._kinds[kind]
             if proof.tobytes() != expected.tobytes():
-                raise BadResult(f"its first pixels differ from those of {other.name}, which has the same device and "
-                                "driver; one of them is broken: run `clrt devices --check` on both")
+                raise BadResult(
+                    f"its first pixels differ from those of {other.name}, which has the same device and "
+                    "driver; one of them is broken: run `clrt devices --check` on both"
+                )
             return
         self._kinds[kind] = member, proof
         other, expected = self._first
         if (differing := _differing(proof, expected)) > MOST_DIFFERING:
-            raise BadResult(f"{differing:.0%} of its first pixels differ from those of {other.name}; one of them is "
-                            "broken: run `clrt devices --check` on both")
+            raise BadResult(
+                f"{differing:.0%} of its first pixels differ from those of {other.name}; one of them is "
+                "broken: run `clrt devices --check` on both"
+            )
         if proof.tobytes() != expected.tobytes():
-            _log.warning("%s (%s) rounds differently from %s (%s): the image is equally accurate, but its last bits "
-                         "depend on which worker renders what", member.name, facts["name"], other.name,
-                         (other.facts or {}).get("name"))
+            _log.warning(
+                "%s (%s) rounds differently from %s (%s): the image is equally accurate, but its last bits "
+                "depend on which worker renders what",
+                member.name,
+                facts["name"],
+                other.name,
+                (other.facts or {}).get("name"),
+            )
 
 
 def _differing(found: NDArray[Any], expected: NDArray[Any]) -> float:

@@ -19,5 +19,7 @@ def opened(selectors: tuple[str | int, ...]) -> list[Device]:
 
 def about(devices: list[Device]) -> dict[str, Any]:
     """Return the devices' distinct names, platforms and drivers."""
-    return {name: " + ".join(dict.fromkeys(getattr(device.info, name) for device in devices))
-            for name in ("name", "platform", "platform_version", "driver")}
+    return {
+        name: " + ".join(dict.fromkeys(getattr(device.info, name) for device in devices))
+        for name in ("name", "platform", "platform_version", "driver")
+    }

@@ -64,6 +64,7 @@ class Answer(NamedTuple):
 
 def answering(function: Callable[P, Any]) -> Callable[P, Answer]:
     """Wrap a function to return an Answer."""
+
     @wraps(function)
     def answer(*arguments: P.args, **named: P.kwargs) -> Answer:
         try:
@@ -98,15 +99,16 @@ def prepare(client: dict[str, str], key: str, text: bytes, digests: list[str], *
     with _starting:
         if (renderer := _found(key)) is None:
             with _table:
-                for old in list(_renderers)[:len(_renderers) + 1 - MOST_KEPT]:
+                for old in list(_renderers)[: len(_renderers) + 1 - MOST_KEPT]:
                     del _renderers[old]
             renderer = _renderers[key] = _made(unpack(text, dict(zip(digests, arrays))))
         return {**renderer.introduction(), "report": renderer.report(), "proof": renderer.proof()}
 
 
 @answering
-def render_share(key: str, tiles: NDArray[Any], first: int, more: int,
-                 pixels: NDArray[Any] | None) -> tuple[NDArray[Any], float]:
+def render_share(
+    key: str, tiles: NDArray[Any], first: int, more: int, pixels: NDArray[Any] | None
+) -> tuple[NDArray[Any], float]:
     """Return the pixels (tiles, TILE_PIXELS) with samples first … first + more − 1 added, and the seconds taken.
 
     pixels: their values before, None without samples. Raises DeviceError if no device can go on.
@@ -122,8 +124,9 @@ def draw(key: str, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
 
 
 @answering
-def render_whole(client: dict[str, str], key: str, text: bytes, part: bytes, digests: list[str],
-                 *arrays: NDArray[Any]) -> tuple[dict[str, Any], float]:
+def render_whole(
+    client: dict[str, str], key: str, text: bytes, part: bytes, digests: list[str], *arrays: NDArray[Any]
+) -> tuple[dict[str, Any], float]:
     """Return a whole image, or a band of one, with its AOVs, and the seconds taken (see `band_renderer.render`).
 
     text: the order, identified by its key; part: its camera and band.
@@ -152,8 +155,10 @@ def _check_identity(client: dict[str, str]) -> None:
     """Raise DeviceError if clrt differs from the client's: images could differ, or records be incompatible."""
     own = identity()
     if own != client:
-        told = [f"clrt {each['version']} with the kernels {each['kernels']} and the code {each.get('code')}"
-                for each in (own, client)]
+        told = [
+            f"clrt {each['version']} with the kernels {each['kernels']} and the code {each.get('code')}"
+            for each in (own, client)
+        ]
         raise DeviceError(f"it runs {told[0]}, this client {told[1]}; install the same version on both")
 
 

@@ -37,7 +37,7 @@ def load(path: StrPath, camera: str | None = None) -> Scene:
     object: value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
-        raise SceneError(f"{path!r} is not the path of a scene; give a file name, such as \"scene.toml\"")
+        raise SceneError(f'{path!r} is not the path of a scene; give a file name, such as "scene.toml"')
     path = Path(path)
     check_scene(path)
     reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower())
@@ -76,10 +76,16 @@ def _load_model(path: Path, view: str | None) -> Scene:
     turn = rotation((0.0, angle or 0.0, 0.0))
     camera = next(iter(model.cameras.values()), None) if angle is None else None
     sun = transform_light(SUN, turn) if angle else SUN
-    return Scene(meshes=model.meshes, instances=model.instances,
-                 camera=camera or frame(model.meshes, model.instances, turn), cameras=model.cameras,
-                 environment=default_sky(), lights=model.lights or [sun], name=name_of(path),
-                 source=source_of_model(path, model, placing))
+    return Scene(
+        meshes=model.meshes,
+        instances=model.instances,
+        camera=camera or frame(model.meshes, model.instances, turn),
+        cameras=model.cameras,
+        environment=default_sky(),
+        lights=model.lights or [sun],
+        name=name_of(path),
+        source=source_of_model(path, model, placing),
+    )
 
 
 def _load_toml(path: Path) -> tuple[Scene, list[str]]:
@@ -97,6 +103,7 @@ def _load_toml(path: Path) -> tuple[Scene, list[str]]:
 def _load_mitsuba(path: Path) -> tuple[Scene, list[str]]:
     """Load a Mitsuba scene, logging a warning per model that only approximates Mitsuba's."""
     from .mitsuba.reader import read_mitsuba
+
     try:
         scene, differences, _ = read_mitsuba(path)
     except SceneError as error:

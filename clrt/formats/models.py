@@ -52,11 +52,13 @@ def read_model(path: StrPath, normals: Normals = "file") -> Model:
 
 def _gltf(path: Path, normals: Normals) -> Model:
     from .gltf.reader import read_gltf
+
     return read_gltf(path, normals)
 
 
 def _obj(path: Path) -> dict[str, Any]:
     from .wavefront.obj import parse_obj
+
     return {"geometry": parse_obj(path)}
 
 
@@ -64,6 +66,7 @@ def _ply(path: Path) -> dict[str, Any]:
     if plain := plain_ply(path):
         return plain
     from trimesh.exchange.ply import load_ply
+
     with path.open("rb") as file:
         parts: dict[str, Any] = load_ply(file, skip_materials=True)
     return parts
@@ -71,6 +74,7 @@ def _ply(path: Path) -> dict[str, Any]:
 
 def _stl(path: Path) -> dict[str, Any]:
     from trimesh.exchange.stl import load_stl
+
     with path.open("rb") as file:
         parts: dict[str, Any] = load_stl(file)
     return parts
@@ -78,6 +82,7 @@ def _stl(path: Path) -> dict[str, Any]:
 
 def _off(path: Path) -> dict[str, Any]:
     from trimesh.exchange.off import load_off
+
     with path.open("rb") as file:
         parts: dict[str, Any] = load_off(file)
     return parts
@@ -86,11 +91,13 @@ def _off(path: Path) -> dict[str, Any]:
 def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals], Model]:
     """Return a reader from a parser, which returns the keyword arguments of trimesh's classes for one mesh (vertices,
     faces, vertex_normals, uv, vertex_colors), or for several by name in `geometry`; it may raise anything."""
+
     def read(path: Path, normals: Normals) -> Model:
         try:
             return Model(meshes=_meshes(_parsed(parse, path), name_of(path), normals))
         except SceneError as error:
             raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+
     return read
 
 
@@ -103,9 +110,14 @@ class ModelFormat(NamedTuple):
 
 
 #: Model formats by suffix.
-FORMATS = {".glb": ModelFormat(_gltf), ".gltf": ModelFormat(_gltf), ".obj": ModelFormat(of_parts(_obj)),
-           ".ply": ModelFormat(of_parts(_ply)), ".stl": ModelFormat(of_parts(_stl), z_up=True),
-           ".off": ModelFormat(of_parts(_off))}
+FORMATS = {
+    ".glb": ModelFormat(_gltf),
+    ".gltf": ModelFormat(_gltf),
+    ".obj": ModelFormat(of_parts(_obj)),
+    ".ply": ModelFormat(of_parts(_ply)),
+    ".stl": ModelFormat(of_parts(_stl), z_up=True),
+    ".off": ModelFormat(of_parts(_off)),
+}
 SUFFIXES = tuple(FORMATS)
 
 
@@ -127,8 +139,9 @@ def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
     several = parts.get("geometry", {stem: parts})
     pieces = {name: piece for name, piece in several.items() if _size(piece.get("faces"))}
     if not pieces:
-        raise SceneError("contains no triangles (points, lines and PLY strips are not supported); export a triangle "
-                         "mesh")
+        raise SceneError(
+            "contains no triangles (points, lines and PLY strips are not supported); export a triangle mesh"
+        )
     meshes, problems = [], []
     for name, piece in pieces.items():
         try:
@@ -157,8 +170,15 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
     if uv is None and material.textures():
         log.warning('mesh "%s" has no texture coordinates; the textures of its material are ignored', name)
         material = material.without_textures()
-    mesh = Mesh(vertices, faces.astype(np.int32), material, name=name, material_name=piece.get("material_name", ""),
-                uv=uv, colors=colors)
+    mesh = Mesh(
+        vertices,
+        faces.astype(np.int32),
+        material,
+        name=name,
+        material_name=piece.get("material_name", ""),
+        uv=uv,
+        colors=colors,
+    )
     problems = index_problems(faces, len(vertices), f'mesh "{name}"') or mesh_problems(mesh, "mesh")
     if problems:
         raise SceneError(problems)

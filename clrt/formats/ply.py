@@ -13,9 +13,24 @@ import numpy as np
 
 _END = b"\nend_header\n"
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
-          "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
-          "float32": "f4", "float64": "f8"}
+_TYPES = {
+    "char": "i1",
+    "uchar": "u1",
+    "short": "i2",
+    "ushort": "u2",
+    "int": "i4",
+    "uint": "u4",
+    "float": "f4",
+    "double": "f8",
+    "int8": "i1",
+    "uint8": "u1",
+    "int16": "i2",
+    "uint16": "u2",
+    "int32": "i4",
+    "uint32": "u4",
+    "float32": "f4",
+    "float64": "f8",
+}
 #: Left to trimesh: with texture coordinates it splits vertices, and it scales colors by their type.
 _TEXTURE = {"u", "v", "s", "t", "texture_u", "texture_v"}
 _COLORS = {"red", "green", "blue"}
@@ -37,8 +52,10 @@ def plain_ply(path: Path) -> dict[str, Any] | None:
     names = set(vertices.dtype.names or ())
     if names & _TEXTURE or _COLORS <= names:
         return None
-    parts = {"vertices": np.column_stack([vertices[axis] for axis in ("x", "y", "z")]),
-             "faces": faces["corners list"]["indices"].astype(np.int64)}
+    parts = {
+        "vertices": np.column_stack([vertices[axis] for axis in ("x", "y", "z")]),
+        "faces": faces["corners list"]["indices"].astype(np.int64),
+    }
     if {"nx", "ny", "nz"} <= names:
         parts["vertex_normals"] = np.column_stack([vertices[axis] for axis in ("nx", "ny", "nz")])
     return parts
@@ -58,8 +75,12 @@ def ply_records(path: Path) -> tuple[Records, Records] | None:
     except (ValueError, KeyError, IndexError):
         return None
     middle = start + vertex_count * vertex.itemsize
-    if (not {"x", "y", "z"} <= set(vertex.names or ()) or "corners list" not in (face.names or ())
-            or min(vertex_count, face_count) < 1 or len(content) != middle + face_count * face.itemsize):
+    if (
+        not {"x", "y", "z"} <= set(vertex.names or ())
+        or "corners list" not in (face.names or ())
+        or min(vertex_count, face_count) < 1
+        or len(content) != middle + face_count * face.itemsize
+    ):
         return None
     vertices = np.frombuffer(content, vertex, vertex_count, start)
     faces = np.frombuffer(content, face, face_count, middle)

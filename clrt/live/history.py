@@ -29,7 +29,7 @@ class History:
             first, last = self._done.pop()
             old, new = old | first, last | new
         if new:
-            self._done = [*self._done[1 - STEPS:], (old, new)]
+            self._done = [*self._done[1 - STEPS :], (old, new)]
             self._undone.clear()
         self._going_on = goes_on and bool(new)
 
@@ -51,8 +51,9 @@ class History:
         """Whether there is a step to redo."""
         return bool(self._undone)
 
-    def _move(self, scene: Scene, source: list[tuple[Parts, Parts]], target: list[tuple[Parts, Parts]],
-              side: int) -> Scene:
+    def _move(
+        self, scene: Scene, source: list[tuple[Parts, Parts]], target: list[tuple[Parts, Parts]], side: int
+    ) -> Scene:
         self._going_on = False
         if not source:
             return scene

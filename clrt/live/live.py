@@ -41,8 +41,7 @@ class Live:
     which is then not uploaded, built or compiled again. device: overrides that of `settings`.
     """
 
-    def __init__(self, scene: Scene, *, device: Selector = None,
-                 settings: Settings = Settings()) -> None:
+    def __init__(self, scene: Scene, *, device: Selector = None, settings: Settings = Settings()) -> None:
         if device is not None:
             settings = replace(settings, device=device)
         self._asked = self._current = ImageRequest(1, scene, settings, False)
@@ -54,7 +53,7 @@ class Live:
         self._history, self._picks = History(), PickRequests()
         self._lock, self._changed = RLock(), Condition()
         self._closed = False
-        self._unseen = True     # no image of the current request has been published
+        self._unseen = True  # no image of the current request has been published
         self._renderer = LiveRenderer(self._begin)
         self._wait_for_end = beside(self._work, daemon=True)
 
@@ -157,8 +156,9 @@ class Live:
     def __enter__(self) -> Live:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
 
     def _ask(self, **changes: Any) -> None:
@@ -189,7 +189,7 @@ class Live:
     def _next(self, last: ImageRequest | None) -> ImageRequest | None:
         """Wait for a request other than the last, or for picks in the last, and return it; None when closed."""
         self._changed.wait_for(lambda: self._closed or bool(self._picks) or self._asked is not last)
-        with self._lock:    # else the newest request could be abandoned along with the last
+        with self._lock:  # else the newest request could be abandoned along with the last
             return None if self._closed else self._asked
 
     def _show(self, asked: ImageRequest) -> None:
@@ -243,13 +243,26 @@ class Live:
         whole, last = renderer.settings.size == asked.size, self._snapshot
         kept = last.denoised if asked.settings.denoise and whole and last.asked == asked.number else None
         picture = {
-            "scene": asked.scene, "settings": asked.settings, "asked": asked.number,
-            "number": last.number + 1, "size": asked.size, "pixels": state.pixels, "denoised": kept,
-            "spp": state.spp, "seconds": state.seconds, "noise": state.noise, "history": list(renderer.history),
-            "error": None, "frames_per_second": float(sum(now - each < 1 for each in self._times)),
-            "rays_per_second": state.film.rays / max(state.seconds, 1e-9), "device": name_of(renderer.devices),
-            "device_bytes": renderer.session.device_bytes, "tree": tree_report(renderer.compiled),
-            "features": renderer.compiled.features, "programs": self._renderer.programs}
+            "scene": asked.scene,
+            "settings": asked.settings,
+            "asked": asked.number,
+            "number": last.number + 1,
+            "size": asked.size,
+            "pixels": state.pixels,
+            "denoised": kept,
+            "spp": state.spp,
+            "seconds": state.seconds,
+            "noise": state.noise,
+            "history": list(renderer.history),
+            "error": None,
+            "frames_per_second": float(sum(now - each < 1 for each in self._times)),
+            "rays_per_second": state.film.rays / max(state.seconds, 1e-9),
+            "device": name_of(renderer.devices),
+            "device_bytes": renderer.session.device_bytes,
+            "tree": tree_report(renderer.compiled),
+            "features": renderer.compiled.features,
+            "programs": self._renderer.programs,
+        }
         with self._lock:
             self._still = (renderer, state) if whole else None
             self._unseen = False

@@ -50,17 +50,17 @@ class LiveRenderer:
     def __init__(self, on_phase: Callable[[str], None]) -> None:
         self._on_phase = on_phase
         self._devices: list[Device] = []
-        self._selector: object = self     # equal to no selector
+        self._selector: object = self  # equal to no selector
         self._pace = ImageSizing()
         self.renderer: Renderer | None = None
         #: Number of program changes.
         self.programs = 0
         self._denoiser: Denoiser | None = None
         self._guides: dict[str, NDArray[np.float32]] = {}
-        self._guided: Renderer | None = None    # renderer of these guides
+        self._guided: Renderer | None = None  # renderer of these guides
         self._denoise_from = 0.0
-        self._met: NDArray[np.generic] = np.zeros((0, 0), np.int32)    # object numbers per pixel
-        self._met_by: Renderer | None = None    # renderer of these numbers
+        self._met: NDArray[np.generic] = np.zeros((0, 0), np.int32)  # object numbers per pixel
+        self._met_by: Renderer | None = None  # renderer of these numbers
 
     def quick_size(self, asked: ImageRequest) -> tuple[int, int]:
         """Return the image size that meets the target frame rate during movements; the full size if that does."""
@@ -73,9 +73,16 @@ class LiveRenderer:
         self._guided = self._met_by = None
         self._open(asked.settings.device)
         last = self.renderer
-        self.renderer = renderer = Renderer(asked.scene, device=self._devices, size=size, spp=spp,
-                                            on_phase=self._on_phase, before=last, first_hits=True,
-                                            **asked.settings.tracing)
+        self.renderer = renderer = Renderer(
+            asked.scene,
+            device=self._devices,
+            size=size,
+            spp=spp,
+            on_phase=self._on_phase,
+            before=last,
+            first_hits=True,
+            **asked.settings.tracing,
+        )
         changed = not (last and last.session.scene.program is renderer.session.scene.program)
         self.programs += changed
         begun = time.perf_counter()
@@ -84,7 +91,7 @@ class LiveRenderer:
             if first == 0:
                 preparation = begun - start - renderer.session.build_seconds
                 self._pace.note(size, state.spp, preparation, time.perf_counter() - begun)
-                if changed:     # some drivers compile at the first launch
+                if changed:  # some drivers compile at the first launch
                     give_back()
             yield state
 

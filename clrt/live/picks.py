@@ -31,10 +31,10 @@ class PickRequests:
         while self._asked:
             x, y, found = self._asked.popleft()
             if not found.set_running_or_notify_cancel():
-                continue    # the request was cancelled
+                continue  # the request was cancelled
             try:
                 thing = seen_at(x, y)
-            except Exception as error:    # any error is passed to the caller of `ask`
+            except Exception as error:  # any error is passed to the caller of `ask`
                 found.set_exception(error)
             else:
                 found.set_result(thing)

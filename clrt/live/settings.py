@@ -34,8 +34,11 @@ class Settings:
     denoise: bool = False
 
     def __post_init__(self) -> None:
-        for name, value, least, most in (("scale", self.scale, 0.01, 4.0), ("frame_rate", self.frame_rate, 0, 1000),
-                                         ("samples", self.samples, 1, 1 << 20)):
+        for name, value, least, most in (
+            ("scale", self.scale, 0.01, 4.0),
+            ("frame_rate", self.frame_rate, 0, 1000),
+            ("samples", self.samples, 1, 1 << 20),
+        ):
             if not least <= value <= most:
                 raise UsageError(f"{name} is {value:g}; it must be {least:g} to {most:g}")
 

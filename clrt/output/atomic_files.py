@@ -27,8 +27,10 @@ def check_target(path: Path) -> None:
     try:
         tempfile.TemporaryFile(dir=path.parent).close()
     except OSError as error:
-        raise OutputError(f"{path}: no file can be written in the folder {path.parent} ({error.strerror}); "
-                          "change its permissions or choose another folder") from error
+        raise OutputError(
+            f"{path}: no file can be written in the folder {path.parent} ({error.strerror}); "
+            "change its permissions or choose another folder"
+        ) from error
 
 
 def make_folder(path: Path) -> None:
@@ -68,10 +70,11 @@ def replacing(path: Path) -> Iterator[Path]:
         keep_mode(target, temporary)
         _move(temporary, target)
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror or error}); "
-                          "free some space there or choose another path") from error
+        raise OutputError(
+            f"{path}: cannot be written ({error.strerror or error}); free some space there or choose another path"
+        ) from error
     finally:
-        with suppress(OSError):     # it was moved, or its folder is gone or read-only by now
+        with suppress(OSError):  # it was moved, or its folder is gone or read-only by now
             temporary.unlink()
 
 
@@ -87,5 +90,7 @@ def _move(new: Path, target: Path) -> None:
             time.sleep(pause)
     kept = target.with_name(f"{target.stem}-{os.urandom(4).hex()}{target.suffix}")
     os.replace(new, kept)
-    raise KeptBesideError(f"{target}: cannot be replaced ({problem.strerror}); is it open in another program, or "
-                          f"read-only? The new file is {kept.name} next to it") from problem
+    raise KeptBesideError(
+        f"{target}: cannot be replaced ({problem.strerror}); is it open in another program, or "
+        f"read-only? The new file is {kept.name} next to it"
+    ) from problem

@@ -32,9 +32,11 @@ class Denoiser:
         try:
             import pyoidn
         except ImportError as error:
-            raise UsageError("denoising needs the package pyoidn, which is not installed: "
-                             "pip install pyoidn (not available for Linux on ARM), or render without "
-                             "denoising") from error
+            raise UsageError(
+                "denoising needs the package pyoidn, which is not installed: "
+                "pip install pyoidn (not available for Linux on ARM), or render without "
+                "denoising"
+            ) from error
         try:
             self._device = pyoidn.Device()
         except OSError as error:
@@ -56,8 +58,10 @@ class Denoiser:
         finite = np.nan_to_num(color, nan=0, posinf=0, neginf=0)
         # Values below 1e-8 count as black, so the image is scaled by a power of two to a mean near 1.
         exponent = -int(np.frexp(np.mean(finite, dtype=np.float64))[1])
-        images = {name: np.ascontiguousarray(image, np.float32)
-                  for name, image in {"color": np.ldexp(finite, exponent), "albedo": albedo, "normal": normal}.items()}
+        images = {
+            name: np.ascontiguousarray(image, np.float32)
+            for name, image in {"color": np.ldexp(finite, exponent), "albedo": albedo, "normal": normal}.items()
+        }
         images["output"] = np.empty_like(images["color"])
         with pyoidn.Filter(self._device) as network:
             for name, image in images.items():
@@ -75,16 +79,20 @@ class Denoiser:
             raise DeviceError(f"Open Image Denoise failed: {problem}")
 
 
-def denoised(image: Image, denoiser: Denoiser, guides: Mapping[str, FloatArray],
-             reference: FloatArray | None = None) -> Image:
+def denoised(
+    image: Image, denoiser: Denoiser, guides: Mapping[str, FloatArray], reference: FloatArray | None = None
+) -> Image:
     """Return the image with denoised pixels, the original ones as `raw`, and `denoise` in its report (docs/report.md).
 
     guides: `albedo` and `normal` of rendering.guides; reference: the ground truth; all of the image's shape.
     """
     start = time.perf_counter()
     pixels = denoiser(image.pixels, guides["albedo"], guides["normal"])
-    done: dict[str, Any] = {"seconds": time.perf_counter() - start, "device": denoiser.name,
-                            "bias": _bias(pixels, image.pixels)}
+    done: dict[str, Any] = {
+        "seconds": time.perf_counter() - start,
+        "device": denoiser.name,
+        "bias": _bias(pixels, image.pixels),
+    }
     if reference is not None:
         done |= {"relmse": relmse(pixels, reference), "reference_bias": _bias(pixels, reference)}
     return Image(pixels, {**image.report, "denoise": done}, image.pixels, image.aovs)

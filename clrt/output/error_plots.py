@@ -31,8 +31,9 @@ def check_plot(path: Path) -> None:
     """Raise OutputError unless a plot can be written at `path`, UsageError if matplotlib is not installed."""
     check_target(path)
     if path.suffix.lower() not in EXTENSIONS:
-        raise OutputError(f"{path}: plots are written as {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}; "
-                          "choose such a file")
+        raise OutputError(
+            f"{path}: plots are written as {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}; choose such a file"
+        )
     if find_spec("matplotlib") is None:
         raise UsageError("plots need matplotlib: install it with `pip install matplotlib`")
 
@@ -80,13 +81,17 @@ def write_figure(path: Path, figure: Figure) -> Path:
 
 
 def _draw(axis: Axes, curves: Mapping[str, Curve]) -> None:
-    drawn = {name: points for name, curve in curves.items()
-             if (points := [(seconds, error) for seconds, error in curve if seconds > 0 and error > 0])}
+    drawn = {
+        name: points
+        for name, curve in curves.items()
+        if (points := [(seconds, error) for seconds, error in curve if seconds > 0 and error > 0])
+    }
     for (name, points), marker in zip(drawn.items(), cycle(MARKERS)):
         axis.plot(*zip(*points), label=name, marker=marker, markersize=4, linewidth=1.4)
     if drawn:
         start, error = next(iter(drawn.values()))[0]
         end = max(points[-1][0] for points in drawn.values())
-        axis.plot([start, end], [error, error * sqrt(start / end)], ":", color="grey", linewidth=1,
-                  label="slope −½", zorder=0)
+        axis.plot(
+            [start, end], [error, error * sqrt(start / end)], ":", color="grey", linewidth=1, label="slope −½", zorder=0
+        )
         axis.legend(frameon=False, fontsize="small")

@@ -57,8 +57,10 @@ def _pixels(picture: AnyImage, name: str) -> FloatArray:
         return read_picture(Path(picture))
     pixels = picture.pixels if isinstance(picture, Image) else picture
     if not isinstance(pixels, np.ndarray) or pixels.ndim != 3 or pixels.shape[2] != 3:
-        raise UsageError(f"{name} is {type(pixels).__name__} {getattr(pixels, 'shape', '')}, not (height, width, 3) "
-                         "pixels; give such an array, a clrt.Image or the path of an image")
+        raise UsageError(
+            f"{name} is {type(pixels).__name__} {getattr(pixels, 'shape', '')}, not (height, width, 3) "
+            "pixels; give such an array, a clrt.Image or the path of an image"
+        )
     return pixels
 
 
@@ -108,5 +110,7 @@ def _flip(image: FloatArray, reference: FloatArray, hdr: bool) -> float | None:
 def _check_sizes(image: FloatArray, reference: FloatArray, image_name: str, reference_name: str) -> None:
     if image.shape != reference.shape:
         (h, w), (height, width) = image.shape[:2], reference.shape[:2]
-        raise SceneError(f"sizes differ: {image_name} has {w}x{h} pixels, {reference_name} {width}x{height}; "
-                         "only images of the same size can be compared")
+        raise SceneError(
+            f"sizes differ: {image_name} has {w}x{h} pixels, {reference_name} {width}x{height}; "
+            "only images of the same size can be compared"
+        )

@@ -26,6 +26,6 @@ def _load() -> None:
     spec = find_spec("OpenImageIO")
     for folder in spec.submodule_search_locations or () if spec else ():
         for library in Path(folder).glob("OpenImageIO.*.so"):
-            with suppress(TypeError, AttributeError):   # not on Windows
+            with suppress(TypeError, AttributeError):  # not on Windows
                 ctypes.CDLL(None).dlopen(os.fsencode(library), os.RTLD_NOW)
     import OpenImageIO  # noqa: F401

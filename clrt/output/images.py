@@ -24,8 +24,10 @@ FloatArray = NDArray[np.float32]
 EXTENSIONS = (".png", ".exr", ".hdr")
 #: Compression settings. A .png at level 1 with differences to the row above (libpng's filter 32) takes 0.12 s for a
 #: noisy 1920x1080 image, level 3 with the library's choice of filters 0.22 s, for a 3 % smaller file.
-ATTRIBUTES: dict[str, dict[str, str | int]] = {".exr": {"compression": "zip"},
-                                               ".png": {"png:compressionLevel": 1, "png:filter": 32}}
+ATTRIBUTES: dict[str, dict[str, str | int]] = {
+    ".exr": {"compression": "zip"},
+    ".png": {"png:compressionLevel": 1, "png:filter": 32},
+}
 #: The largest value in RGBE: mantissa 255 of 256, exponent 127.
 RGBE_MAX = 255 / 256 * 2.0**127
 
@@ -51,14 +53,22 @@ def check_writable(path: Path) -> None:
     check_target(path)
     extension = path.suffix.lower()
     if extension not in EXTENSIONS:
-        meant = "".join(f"; did you mean {path.with_suffix(match)}?"
-                        for match in get_close_matches(extension, EXTENSIONS, 1))
+        meant = "".join(
+            f"; did you mean {path.with_suffix(match)}?" for match in get_close_matches(extension, EXTENSIONS, 1)
+        )
         problem = f"unknown image format {extension}" if extension else "the name has no extension"
         raise OutputError(f"{path}: {problem}; use {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}{meant}")
 
 
-def write_image(path: StrPath, pixels: FloatArray, *, metadata: Mapping[str, str] | None = None,
-                exposure: float = 0.0, view: str = "srgb", aovs: Pictures | None = None) -> None:
+def write_image(
+    path: StrPath,
+    pixels: FloatArray,
+    *,
+    metadata: Mapping[str, str] | None = None,
+    exposure: float = 0.0,
+    view: str = "srgb",
+    aovs: Pictures | None = None,
+) -> None:
     """Write (h, w, 3) float32 linear pixels in the format of the extension, atomically (see `replacing`).
 
     `aovs`, if any, become layers of an .exr and separate files for a .png (see `layers`); an .hdr omits them.
@@ -91,8 +101,14 @@ def _tell_flaws(path: Path, pixels: FloatArray) -> None:
     flaws = (np.isnan(pixels), pixels < 0, np.isposinf(pixels))
     nan, negative, infinite = map(np.count_nonzero, flaws)
     if nan or negative or infinite:
-        _log.warning("%s: of the image's values, %d are NaN and %d negative, written as 0, and %d infinite, written "
-                     "as the largest value", path, nan, negative, infinite)
+        _log.warning(
+            "%s: of the image's values, %d are NaN and %d negative, written as 0, and %d infinite, written "
+            "as the largest value",
+            path,
+            nan,
+            negative,
+            infinite,
+        )
 
 
 def _write_png(path: Path, samples: NDArray[np.uint8], metadata: Mapping[str, str]) -> None:
@@ -118,15 +134,17 @@ def rgbe_rounded(pixels: FloatArray) -> FloatArray:
     return rounded.astype(np.float32)
 
 
-def _write(path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int],
-           channels: Sequence[str] = ("R", "G", "B")) -> None:
+def _write(
+    path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int], channels: Sequence[str] = ("R", "G", "B")
+) -> None:
     """Write uint8 or float32 samples unchanged, atomically; raises OutputError with the writer's reason."""
     with replacing(path) as temporary:
         _write_file(temporary, samples, attributes, channels)
 
 
-def _write_file(path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int],
-                channels: Sequence[str]) -> None:
+def _write_file(
+    path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int], channels: Sequence[str]
+) -> None:
     import OpenImageIO as oiio
 
     height, width = samples.shape[:2]
@@ -135,9 +153,13 @@ def _write_file(path: Path, samples: NDArray[Any], attributes: Mapping[str, str 
     for name, value in attributes.items():
         spec.attribute(name, value)
     output = oiio.ImageOutput.create(str(path))
-    done = (output is not None and output.open(str(path), spec)
-            # OpenImageIO misreads strides, so it gets contiguous rows.
-            and output.write_image(np.ascontiguousarray(samples)) and output.close())
+    done = (
+        output is not None
+        and output.open(str(path), spec)
+        # OpenImageIO misreads strides, so it gets contiguous rows.
+        and output.write_image(np.ascontiguousarray(samples))
+        and output.close()
+    )
     # For some formats a full disk is only reported as a message after a "successful" close.
     complaint = (output or oiio).geterror()
     if complaint or not done:

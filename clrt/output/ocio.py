@@ -36,12 +36,15 @@ def ocio_view(config: str, view: str) -> Callable[[FloatArray], FloatArray]:
     display, view = _display_view(config, colors, view)
     source = next((name for name in REC709 if colors.getColorSpaceIndex(colors.resolve(name)) >= 0), None)
     if source is None:
-        raise UsageError(f"{config}: has no colour space called {', '.join(REC709)}; give its linear Rec. 709 space "
-                         f"the alias {REC709[1]}")
+        raise UsageError(
+            f"{config}: has no colour space called {', '.join(REC709)}; give its linear Rec. 709 space "
+            f"the alias {REC709[1]}"
+        )
 
     def shown(linear: FloatArray) -> FloatArray:
-        buffer = oiio.ImageBufAlgo.ociodisplay(oiio.ImageBuf(np.ascontiguousarray(linear)), display, view,
-                                               colors.resolve(source), colorconfig=config)
+        buffer = oiio.ImageBufAlgo.ociodisplay(
+            oiio.ImageBuf(np.ascontiguousarray(linear)), display, view, colors.resolve(source), colorconfig=config
+        )
         if buffer.has_error:
             raise UsageError(f"{config}: OpenColorIO cannot show {display}/{view}: {buffer.geterror()}")
         return np.asarray(buffer.get_pixels(oiio.FLOAT))
@@ -55,8 +58,11 @@ def _config(config: str) -> Any:
 
     colors = oiio.ColorConfig(config)
     if problem := colors.geterror():
-        remedy = ("install a newer OpenImageIO" if config.startswith("ocio:") else
-                  "set the environment variable OCIO to a valid one, or unset it")
+        remedy = (
+            "install a newer OpenImageIO"
+            if config.startswith("ocio:")
+            else "set the environment variable OCIO to a valid one, or unset it"
+        )
         raise UsageError(f"{config}: is not a usable OpenColorIO config ({problem.splitlines()[0]}); {remedy}")
     return colors
 
@@ -67,10 +73,13 @@ def _display_view(config: str, colors: Any, name: str) -> tuple[str, str]:
     views = colors.getViewNames(display)
     if name in views or not name:
         return display, name or colors.getDefaultViewName(display)
-    all_views = {f"{each}/{view}": (each, view) for each in colors.getDisplayNames()
-                 for view in colors.getViewNames(each)}
+    all_views = {
+        f"{each}/{view}": (each, view) for each in colors.getDisplayNames() for view in colors.getViewNames(each)
+    }
     if name in all_views:
         return all_views[name]
     meant = "".join(f"; did you mean ocio:{match}?" for match in get_close_matches(name, [*views, *all_views], 1))
-    raise UsageError(f"{config}: view {name!r} is unknown; {display} has {', '.join(views)}, others are named "
-                     f"DISPLAY/VIEW for {', '.join(colors.getDisplayNames())}{meant}")
+    raise UsageError(
+        f"{config}: view {name!r} is unknown; {display} has {', '.join(views)}, others are named "
+        f"DISPLAY/VIEW for {', '.join(colors.getDisplayNames())}{meant}"
+    )

@@ -25,5 +25,6 @@ def write_report(path: Path, report: Mapping[str, Any]) -> Path:
 
 def header_of(report: Mapping[str, Any]) -> dict[str, str]:
     """Return the report's scalar values, for an image file's header."""
-    return {f"clrt:{key}": printable(str(value)) for key, value in report.items()
-            if isinstance(value, (str, int, float))}
+    return {
+        f"clrt:{key}": printable(str(value)) for key, value in report.items() if isinstance(value, (str, int, float))
+    }

@@ -18,8 +18,15 @@ from .view_transform import check_view, to_display
 BLOCK_ROWS = 16
 
 
-def write_rows(path: Path, size: tuple[int, int], pieces: Iterable[NDArray[np.float32]], *,
-               metadata: Mapping[str, str] | None = None, view: str = "srgb", exposure: float = 0.0) -> None:
+def write_rows(
+    path: Path,
+    size: tuple[int, int],
+    pieces: Iterable[NDArray[np.float32]],
+    *,
+    metadata: Mapping[str, str] | None = None,
+    view: str = "srgb",
+    exposure: float = 0.0,
+) -> None:
     """Write an image of size (width, height) from consecutive pieces (rows, width, 3), as `write_image` would,
     atomically. The rows of all pieces but the last are a multiple of BLOCK_ROWS. Raises OutputError."""
     import OpenImageIO as oiio

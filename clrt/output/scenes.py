@@ -25,8 +25,9 @@ def save_scene(scene: Scene, path: StrPath, *, force: bool = True) -> list[Path]
     try:
         text = files.text.encode()
     except UnicodeEncodeError:
-        raise OutputError(f"{path}: this file's name is not valid text, so a scene file cannot contain it; rename it"
-                          ) from None
+        raise OutputError(
+            f"{path}: this file's name is not valid text, so a scene file cannot contain it; rename it"
+        ) from None
     written = [path.with_name(name) for name in (*files.models, *files.texels, *files.pixels)]
     for other in written:
         check_target(other)

@@ -30,7 +30,7 @@ def _has_last_row(path: Path) -> bool:
 
     opened = oiio.ImageInput.open(str(path))
     if opened is None:
-        oiio.geterror()     # fetched, or it would be printed at exit
+        oiio.geterror()  # fetched, or it would be printed at exit
         return False
     row = opened.read_scanline(opened.spec().height - 1, 0, "float")
     return row is not None and not opened.geterror()

@@ -23,9 +23,13 @@ from .atomic_files import check_target, replacing
 #: ffmpeg's options: nearly lossless quality, and sRGB colors with the matrix of Rec. 709.
 CODECS: dict[str, tuple[str, list[str]]] = {
     ".mp4": ("libx264", ["-crf", "17", "-movflags", "+faststart"]),
-    ".webm": ("libvpx-vp9", ["-crf", "24", "-b:v", "0", "-row-mt", "1"])}
-COLORS = ["-vf", "scale=out_color_matrix=bt709:out_range=tv,"
-          "setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1:range=tv"]
+    ".webm": ("libvpx-vp9", ["-crf", "24", "-b:v", "0", "-row-mt", "1"]),
+}
+COLORS = [
+    "-vf",
+    "scale=out_color_matrix=bt709:out_range=tv,"
+    "setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1:range=tv",
+]
 VIDEOS = (".gif", *CODECS)
 #: Maximum frames per second; browsers show faster ones at 10.
 FASTEST_GIF = 50.0
@@ -44,18 +48,25 @@ def check_video(path: Path, size: tuple[int, int], fps: float) -> None:
     width, height = size
     if path.suffix.lower() == ".gif":
         if fps > FASTEST_GIF:
-            raise UsageError(f"{path}: {fps:g} frames per second are more than the {FASTEST_GIF:g} that a .gif "
-                             "supports; write an .mp4, or lower --fps")
+            raise UsageError(
+                f"{path}: {fps:g} frames per second are more than the {FASTEST_GIF:g} that a .gif "
+                "supports; write an .mp4, or lower --fps"
+            )
         if 1 / fps > LONGEST_GIF:
-            raise UsageError(f"{path}: {1 / fps:g} s are more than the {LONGEST_GIF:g} s that a frame of a .gif can "
-                             "last; write an .mp4, or raise --fps")
+            raise UsageError(
+                f"{path}: {1 / fps:g} s are more than the {LONGEST_GIF:g} s that a frame of a .gif can "
+                "last; write an .mp4, or raise --fps"
+            )
         return
     if find_spec("imageio_ffmpeg") is None:
-        raise UsageError(f"{path}: {path.suffix} videos need ffmpeg: run `pip install 'imageio[ffmpeg]'`, or "
-                         "write a .gif")
+        raise UsageError(
+            f"{path}: {path.suffix} videos need ffmpeg: run `pip install 'imageio[ffmpeg]'`, or write a .gif"
+        )
     if width % 2 or height % 2:
-        raise UsageError(f"{path}: {path.suffix} videos need an even width and height; use --size "
-                         f"{width + width % 2}x{height + height % 2}")
+        raise UsageError(
+            f"{path}: {path.suffix} videos need an even width and height; use --size "
+            f"{width + width % 2}x{height + height % 2}"
+        )
 
 
 def write_video(path: Path, pictures: Sequence[Path], fps: float) -> Path:
@@ -63,7 +74,7 @@ def write_video(path: Path, pictures: Sequence[Path], fps: float) -> Path:
     with replacing(path) as temporary:
         try:
             (_write_gif if path.suffix.lower() == ".gif" else _write_by_ffmpeg)(temporary, pictures, fps)
-        except (RuntimeError, ValueError, SyntaxError) as error:   # raised by imageio, ffmpeg and pillow
+        except (RuntimeError, ValueError, SyntaxError) as error:  # raised by imageio, ffmpeg and pillow
             raise OutputError(f"{path}: the video cannot be written: {error}") from error
     return path
 
@@ -99,13 +110,33 @@ def _write_by_ffmpeg(path: Path, pictures: Sequence[Path], fps: float) -> None:
     frames = _frames(pictures)
     first = next(frames)
     height, width = first.shape[:2]
-    command = [get_ffmpeg_exe(), "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-               "-r", str(Fraction(fps).limit_denominator()), "-i", "-", "-vcodec", codec, "-pix_fmt", "yuv420p",
-               *options, *COLORS, str(path)]
+    command = [
+        get_ffmpeg_exe(),
+        "-y",
+        "-v",
+        "error",
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-s",
+        f"{width}x{height}",
+        "-r",
+        str(Fraction(fps).limit_denominator()),
+        "-i",
+        "-",
+        "-vcodec",
+        codec,
+        "-pix_fmt",
+        "yuv420p",
+        *options,
+        *COLORS,
+        str(path),
+    ]
     with TemporaryFile() as errors:
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=errors) as ffmpeg:
             assert ffmpeg.stdin is not None
-            with suppress(BrokenPipeError):    # ffmpeg has exited
+            with suppress(BrokenPipeError):  # ffmpeg has exited
                 for frame in chain([first], frames):
                     ffmpeg.stdin.write(frame.tobytes())
         if ffmpeg.returncode:

@@ -26,9 +26,14 @@ BRIGHTEST = 1e15
 #: Rows processed at a time; larger temporary arrays are allocated from the system each time, which is slower.
 ROWS = 16
 #: "agx": Rec. 709 with its primaries moved towards white, and the values that map to 0 and 1, as binary logarithms.
-AGX_INSET = np.array([[0.842479062253094, 0.0784335999999992, 0.0792237451477643],
-                      [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
-                      [0.0423756549057051, 0.0784336, 0.879142973793104]], np.float32)
+AGX_INSET = np.array(
+    [
+        [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
+        [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
+        [0.0423756549057051, 0.0784336, 0.879142973793104],
+    ],
+    np.float32,
+)
 AGX_DARKEST, AGX_BRIGHTEST = -12.47393, 4.026069
 #: The curve's pivot, its steepest point: middle grey, 10 stops below and 6.5 above; its slope; toe and shoulder power.
 AGX_PIVOT, AGX_SLOPE, AGX_TOE, AGX_SHOULDER = (10 / 16.5, 0.5), 2.0, 3.0, 3.25
@@ -64,8 +69,11 @@ def agx(linear: FloatArray) -> FloatArray:
     """
     stops = np.log2(np.maximum(linear @ AGX_INSET.T, np.float32(2**AGX_DARKEST)))
     x = np.clip((stops - AGX_DARKEST) / (AGX_BRIGHTEST - AGX_DARKEST), 0, 1).astype(np.float32)
-    return np.where(x < AGX_PIVOT[0], 0.5 - _agx_half(AGX_PIVOT[0] - x, *AGX_PIVOT, AGX_TOE),
-                    0.5 + _agx_half(x - AGX_PIVOT[0], 1 - AGX_PIVOT[0], 1 - AGX_PIVOT[1], AGX_SHOULDER))
+    return np.where(
+        x < AGX_PIVOT[0],
+        0.5 - _agx_half(AGX_PIVOT[0] - x, *AGX_PIVOT, AGX_TOE),
+        0.5 + _agx_half(x - AGX_PIVOT[0], 1 - AGX_PIVOT[0], 1 - AGX_PIVOT[1], AGX_SHOULDER),
+    )
 
 
 def _agx_half(away: FloatArray, width: float, height: float, power: float) -> FloatArray:
@@ -124,7 +132,7 @@ def to_display(pixels: FloatArray, view: str = "srgb", exposure: float = 0.0) ->
     levels = np.empty(pixels.shape, np.uint8)
     for first in range(0, len(pixels), ROWS):
         with np.errstate(over="ignore", invalid="ignore"):
-            exposed = pixels[first:first + ROWS] * np.exp2(np.float32(exposure))
+            exposed = pixels[first : first + ROWS] * np.exp2(np.float32(exposure))
         linear = np.clip(np.nan_to_num(exposed, nan=0.0, posinf=BRIGHTEST), np.float32(0), np.float32(BRIGHTEST))
-        levels[first:first + ROWS] = np.floor(255 * np.clip(shown(linear), 0, 1) + np.float32(0.5))
+        levels[first : first + ROWS] = np.floor(255 * np.clip(shown(linear), 0, 1) + np.float32(0.5))
     return levels

@@ -63,8 +63,16 @@ class TreeQuery:
     query opens its device by the same selector, and returns the same results.
     """
 
-    def __init__(self, device: Device, tree: Layout, counts: tuple[int, int], frame: SceneFrame, tests: HitTests,
-                 traversal: str | None, selector: str | int | None = None) -> None:
+    def __init__(
+        self,
+        device: Device,
+        tree: Layout,
+        counts: tuple[int, int],
+        frame: SceneFrame,
+        tests: HitTests,
+        traversal: str | None,
+        selector: str | int | None = None,
+    ) -> None:
         """Create a query for a BVH over `counts`, the numbers of triangles and spheres, in `frame`. selector: the
         argument that opened the device."""
         self.device, self._selector = device, selector
@@ -102,7 +110,7 @@ class TreeQuery:
         buffers = {name: resident(self.device, array) for name, array in tree.buffers.items()}
         tree, scene = replace(tree, buffers=buffers), [array.buffer for array in buffers.values()]
         hit = INSTANCE_HIT if "instances" in buffers else HIT
-        self.tree, self.frame, self._hit, self._scene = tree, frame, hit, scene    # all or none, if interrupted
+        self.tree, self.frame, self._hit, self._scene = tree, frame, hit, scene  # all or none, if interrupted
 
     @with_default_errors
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:
@@ -122,8 +130,9 @@ class TreeQuery:
         return self._ask("any_hit", rays, np.empty(len(rays[2]), np.bool_))
 
     @with_default_errors
-    def all_hits(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf, *,
-                 max_hits: int = 100) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    def all_hits(
+        self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf, *, max_hits: int = 100
+    ) -> tuple[NDArray[np.int64], NDArray[Any]]:
         """Return all hits at 0 < t < t_max, up to `max_hits` per ray: ray indices (k,), `closest_hit` records (k,).
 
         Sorted by ray, then t, then primitive. Each hit is found from the one before by comparing (t, primitive), not by
@@ -168,9 +177,11 @@ class TreeQuery:
             return
         ended = answers["primitive"] == -2 if answers.dtype.names else answers.view(np.uint8) == 2
         if ended.any():
-            raise DeviceError(f"{self.device.info.name} ({self.device.info.platform}): the driver ends every loop of a "
-                              f"work-item after {turns} iterations, and {np.count_nonzero(ended)} of {len(answers)} "
-                              f"rays need more in the layout {self.tree.name}; use another device or layout")
+            raise DeviceError(
+                f"{self.device.info.name} ({self.device.info.platform}): the driver ends every loop of a "
+                f"work-item after {turns} iterations, and {np.count_nonzero(ended)} of {len(answers)} "
+                f"rays need more in the layout {self.tree.name}; use another device or layout"
+            )
 
     def _parts(self, name: str, n: int) -> Iterator[slice]:
         """Yield slices of n rays, one per launch."""
@@ -201,8 +212,12 @@ class TreeQuery:
 
     def _way(self, name: str, directions: NDArray[np.float32]) -> str:
         """Return the traversal for these rays."""
-        packets = (self.device.lanes == LANES and self._tests.triangle == "watertight" and self._hit is HIT
-                   and not self._counts["spheres"])
+        packets = (
+            self.device.lanes == LANES
+            and self._tests.triangle == "watertight"
+            and self._hit is HIT
+            and not self._counts["spheres"]
+        )
         if name == "next_hit" or loop_turns(self.device) is not None or (self._traversal == "packet" and not packets):
             return "single"
         if self._traversal is not None:
@@ -217,8 +232,9 @@ class TreeQuery:
         key = name, traversal, tree_defines(self.tree)["STACK_SIZE"]
         if key not in self._kernels:
             program = build(self.device, self.source(name, traversal), self.tree.bytes)
-            self._kernels[key] = make_kernel(self.device, program,
-                                             "query_pool" if traversal == "pool" else f"query_{name}")
+            self._kernels[key] = make_kernel(
+                self.device, program, "query_pool" if traversal == "pool" else f"query_{name}"
+            )
         return self._kernels[key]
 
     def source(self, name: str, traversal: str) -> str:
@@ -227,17 +243,27 @@ class TreeQuery:
         check_choice("traversal", traversal, TRAVERSALS)
         triangles, spheres = bool(self._counts["triangles"]), bool(self._counts["spheres"])
         instances = self._hit is INSTANCE_HIT
-        has = tree_features(triangles, spheres) | {"INSTANCES": instances, "NEXT_HIT": name == "next_hit",
-                                                   "LOOP_LIMIT": loop_turns(self.device) is not None}
+        has = tree_features(triangles, spheres) | {
+            "INSTANCES": instances,
+            "NEXT_HIT": name == "next_hit",
+            "LOOP_LIMIT": loop_turns(self.device) is not None,
+        }
         values = {"LANES": self.device.lanes, **tree_defines(self.tree)}
         values |= {feature: 1 for feature, present in has.items() if present}
-        values |= {"packet": {"PACKET_RAYS": 1, "EMPTY": EMPTY}, "single": {},
-                   "pool": {"POOL": POOL, "SHARE": SHARE, "STOP_AT_FIRST": int(name == "any_hit")}}[traversal]
-        preamble = "\n".join([defines(values), typedefs({"Counts": COUNTS, "RayHit": self._hit}),
-                              scene_struct(tree_buffers(self.tree))])
+        values |= {
+            "packet": {"PACKET_RAYS": 1, "EMPTY": EMPTY},
+            "single": {},
+            "pool": {"POOL": POOL, "SHARE": SHARE, "STOP_AT_FIRST": int(name == "any_hit")},
+        }[traversal]
+        preamble = "\n".join(
+            [defines(values), typedefs({"Counts": COUNTS, "RayHit": self._hit}), scene_struct(tree_buffers(self.tree))]
+        )
         files = tree_files(self.tree.name, self._tests, triangles, spheres, instances=instances)
-        return compose(preamble, "query/query_pool.cl" if traversal == "pool" else "query/query.cl",
-                       files | {"PACKETS": ["traverse/packet.cl"] if traversal == "packet" else []})
+        return compose(
+            preamble,
+            "query/query_pool.cl" if traversal == "pool" else "query/query.cl",
+            files | {"PACKETS": ["traverse/packet.cl"] if traversal == "packet" else []},
+        )
 
 
 def _shown(hits: NDArray[Any]) -> NDArray[Any]:
@@ -249,7 +275,7 @@ def _coherent(directions: NDArray[np.float32]) -> bool:
     """Return whether consecutive rays (n, 3) have similar directions, from a sample of pairs."""
     if len(directions) < 2:
         return False
-    first = np.linspace(0, max(0, len(directions) - 2), PAIRS).astype(np.intp)[:len(directions) - 1]
+    first = np.linspace(0, max(0, len(directions) - 2), PAIRS).astype(np.intp)[: len(directions) - 1]
     with np.errstate(all="ignore"):
         one, other = directions[first].astype(np.float64), directions[first + 1].astype(np.float64)
         cosine = (one * other).sum(1) / (np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1))

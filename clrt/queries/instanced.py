@@ -39,20 +39,36 @@ class InstancedRayQuery(TreeQuery):
     """
 
     @with_default_errors
-    def __init__(self, meshes: Sequence[tuple[ArrayLike, ArrayLike]], mesh: ArrayLike, transforms: ArrayLike, *,
-                 device: str | int | None = None, layout: str | None = None, builder: str | None = None,
-                 triangle: str = "watertight", box: str = "robust", traversal: str | None = None) -> None:
+    def __init__(
+        self,
+        meshes: Sequence[tuple[ArrayLike, ArrayLike]],
+        mesh: ArrayLike,
+        transforms: ArrayLike,
+        *,
+        device: str | int | None = None,
+        layout: str | None = None,
+        builder: str | None = None,
+        triangle: str = "watertight",
+        box: str = "robust",
+        traversal: str | None = None,
+    ) -> None:
         """Build the BVHs; see the class."""
         triangles = _meshes(meshes)
         self._mesh = _indices(mesh, len(triangles))
-        self._extents = np.array([np.abs(mesh_corners).reshape(-1, 3).max(axis=0, initial=0)
-                                  for mesh_corners in triangles], np.float64).reshape(-1, 3)
+        self._extents = np.array(
+            [np.abs(mesh_corners).reshape(-1, 3).max(axis=0, initial=0) for mesh_corners in triangles], np.float64
+        ).reshape(-1, 3)
         self._units = np.array([unit_for(largest) for largest in self._extents.max(axis=1).tolist()])
         to_world = _matrices(transforms, len(self._mesh))
         tests, opened = HitTests(triangle, box), open_device(device)
-        self._levels = TwoLevelBvh(opened, opened.layout if layout is None else layout, builder,
-                                   [(mesh_corners * unit).astype(np.float32)
-                                    for mesh_corners, unit in zip(triangles, self._units)], self._mesh, triangle)
+        self._levels = TwoLevelBvh(
+            opened,
+            opened.layout if layout is None else layout,
+            builder,
+            [(mesh_corners * unit).astype(np.float32) for mesh_corners, unit in zip(triangles, self._units)],
+            self._mesh,
+            triangle,
+        )
         tree, frame = self._placed(to_world)
         super().__init__(opened, tree, (sum(map(len, triangles)), 0), frame, tests, traversal, device)
 
@@ -120,6 +136,11 @@ def _matrices(transforms: ArrayLike, instances: int) -> Doubles:
     faults = transform_faults(to_world)
     firsts = {fault: (int(np.argmax(wrong)), int(wrong.sum())) for fault, wrong in faults.items() if wrong.any()}
     if firsts:
-        raise SceneError([f"transforms[{first}] = {to_world[first].tolist()} {fault}; repair it"
-                          + f" and {count - 1} more like it" * (count > 1) for fault, (first, count) in firsts.items()])
+        raise SceneError(
+            [
+                f"transforms[{first}] = {to_world[first].tolist()} {fault}; repair it"
+                + f" and {count - 1} more like it" * (count > 1)
+                for fault, (first, count) in firsts.items()
+            ]
+        )
     return to_world

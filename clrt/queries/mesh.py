@@ -44,10 +44,20 @@ class RayQuery(TreeQuery):
     """
 
     @with_default_errors
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, spheres: ArrayLike | None = None,
-                 device: str | int | None = None, layout: str | None = None, builder: str | None = None,
-                 triangle: str = "watertight", box: str = "robust", sphere: str = "robust",
-                 traversal: str | None = None) -> None:
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        spheres: ArrayLike | None = None,
+        device: str | int | None = None,
+        layout: str | None = None,
+        builder: str | None = None,
+        triangle: str = "watertight",
+        box: str = "robust",
+        sphere: str = "robust",
+        traversal: str | None = None,
+    ) -> None:
         """Build the BVH; see the class."""
         points, self._faces = mesh_arrays(vertices, faces)
         self._spheres = sphere_array(np.zeros((0, 4)) if spheres is None else spheres)

@@ -64,8 +64,10 @@ def needs_direct_light(names: Iterable[str]) -> bool:
 def check_light(names: Iterable[str], integrator: str) -> None:
     """Raise UsageError if AOVs of light are requested from an integrator that does not compute light transport."""
     if needs_direct_light(names) and integrator not in WITH_LIGHT:
-        raise UsageError(f"the AOVs {' and '.join(LIGHT)} store light, and the integrator is {integrator}; choose "
-                         f"{' or '.join(WITH_LIGHT)}")
+        raise UsageError(
+            f"the AOVs {' and '.join(LIGHT)} store light, and the integrator is {integrator}; choose "
+            f"{' or '.join(WITH_LIGHT)}"
+        )
 
 
 def seen_first(names: Iterable[str]) -> tuple[str, ...]:

@@ -34,21 +34,36 @@ def listed(options: type, settings: Sequence[type] = ()) -> Callable[[F], F]:
             made.__init__ = _checked(made.__init__, function.__name__, hints, described)
         else:
             made = _checked(function, function.__name__, hints, described)
-        made.__doc__ = "\n".join([f"{(made.__doc__ or '').rstrip()}\n", "    Keywords:\n", *(
-            fill(f"- {name}: {_description(name, hint, described)}", 120, initial_indent=" " * 4,
-                 subsequent_indent=" " * 6) for name, hint in hints.items())])
+        made.__doc__ = "\n".join(
+            [
+                f"{(made.__doc__ or '').rstrip()}\n",
+                "    Keywords:\n",
+                *(
+                    fill(
+                        f"- {name}: {_description(name, hint, described)}",
+                        120,
+                        initial_indent=" " * 4,
+                        subsequent_indent=" " * 6,
+                    )
+                    for name, hint in hints.items()
+                ),
+            ]
+        )
         return cast(F, made)
 
     return decorate
 
 
-def _checked(call: Callable[..., Any], name: str, hints: Mapping[str, Any],
-             described: Mapping[str, Field[Any]]) -> Callable[..., Any]:
+def _checked(
+    call: Callable[..., Any], name: str, hints: Mapping[str, Any], described: Mapping[str, Field[Any]]
+) -> Callable[..., Any]:
     """Return the call that refuses unknown keywords, with its full signature."""
     own = [each for each in signature(call).parameters.values() if each.kind is not Parameter.VAR_KEYWORD]
     known = {each.name for each in own} | {*hints}
-    keywords = [Parameter(each, Parameter.KEYWORD_ONLY, default=_default(each, hint, described), annotation=_type(hint))
-                for each, hint in hints.items()]
+    keywords = [
+        Parameter(each, Parameter.KEYWORD_ONLY, default=_default(each, hint, described), annotation=_type(hint))
+        for each, hint in hints.items()
+    ]
 
     @wraps(call)
     def checked(*arguments: Any, **given: Any) -> Any:
@@ -75,6 +90,7 @@ def _description(name: str, hint: Any, described: Mapping[str, Field[Any]]) -> s
     """Return what a keyword does, and the values that it may have."""
     own, field = get_args(hint)[1:] if get_origin(hint) is Annotated else (), described.get(name)
     text = own[0] if own else field.metadata["description"] if field else ""
-    values = [each for part in (_type(hint), *get_args(_type(hint))) if get_origin(part) is Literal
-              for each in get_args(part)]
+    values = [
+        each for part in (_type(hint), *get_args(_type(hint))) if get_origin(part) is Literal for each in get_args(part)
+    ]
     return f"{text} One of {', '.join(map(repr, values))}." if values else text

@@ -50,7 +50,7 @@ class PassLoop:
             self.interval.made()
             before = progress.stop_reason, progress.session.samples_done
             yield state
-            if (progress.stop_reason, progress.session.samples_done) != before:    # another call rendered meanwhile
+            if (progress.stop_reason, progress.session.samples_done) != before:  # another call rendered meanwhile
                 self.watch.set(progress.seconds)
                 self.begun = None
                 if self._stopped_before():
@@ -115,10 +115,11 @@ class PassLoop:
         if progress.requests.abandoned:
             return None
         progress.heed_interrupt()
-        if state is None:    # save first: the process may end soon
+        if state is None:  # save first: the process may end soon
             progress.save(film, last=True)
-            return progress.convergence.record(film, tile_samples, progress.seconds, self.reference,
-                                               in_haste=self.begun is None)
+            return progress.convergence.record(
+                film, tile_samples, progress.seconds, self.reference, in_haste=self.begun is None
+            )
         if progress.stop_reason is None and checks_error and self.limits.low_enough(state.stops_by):
             progress.stop_reason = "error"
         progress.save(film, last=progress.stop_reason is not None)
@@ -134,7 +135,8 @@ class PassLoop:
         """Return the state of the film, recorded in the history; None if a request to stop cancels that."""
         progress = self.progress
         try:
-            return progress.convergence.record(film, tile_samples, progress.seconds, self.reference,
-                                               token=progress.token())
+            return progress.convergence.record(
+                film, tile_samples, progress.seconds, self.reference, token=progress.token()
+            )
         except Cancelled:
             return None

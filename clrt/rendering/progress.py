@@ -22,8 +22,9 @@ class Progress:
     session: its samples; planned_spp, percentile: see `Convergence`; checkpoints: where its state is saved, if it is.
     """
 
-    def __init__(self, session: Accumulation, planned_spp: int | None, percentile: float | None,
-                 checkpoints: Checkpoints | None) -> None:
+    def __init__(
+        self, session: Accumulation, planned_spp: int | None, percentile: float | None, checkpoints: Checkpoints | None
+    ) -> None:
         self.session, self._planned_spp, self._percentile = session, planned_spp, percentile
         self.checkpoints, self.requests = checkpoints, StopRequests()
         self.begin()
@@ -64,8 +65,16 @@ class Progress:
         """Write a checkpoint if one is due, or start writing the last one; film: the current film, if known."""
         if self.checkpoints is not None and (last or self.checkpoints.due):
             write = self.checkpoints.begin if last else self.checkpoints.write
-            write(SavedState(self._planned_spp, self.seconds, self.convergence.history, film or self.session.film(),
-                             self.session.work_left(), self.convergence.noise))
+            write(
+                SavedState(
+                    self._planned_spp,
+                    self.seconds,
+                    self.convergence.history,
+                    film or self.session.film(),
+                    self.session.work_left(),
+                    self.convergence.noise,
+                )
+            )
 
     @property
     def saves_unfinished(self) -> bool:

@@ -21,16 +21,24 @@ _log = logging.getLogger(__name__)
 
 def nonfinite_warnings(dropped: int, samples: int) -> list[str]:
     """Return one warning if samples were dropped, else none."""
-    return [f"{dropped} of {samples} samples were not finite and were dropped, so the image may be too dark; look "
-            "for extreme values in lights, textures and materials"] if dropped else []
+    return (
+        [
+            f"{dropped} of {samples} samples were not finite and were dropped, so the image may be too dark; look "
+            "for extreme values in lights, textures and materials"
+        ]
+        if dropped
+        else []
+    )
 
 
 def bias_warnings(settings: RenderSettings, removed: float) -> list[str]:
     """Return one warning if a setting biases the image, else none. removed: the fraction of the light."""
     if not (names := biased_by(settings)):
         return []
-    return [f"the image is biased by {' and '.join(names)}: {removed:.2%} of the light was removed; the estimated "
-            "error does not include this bias"]
+    return [
+        f"the image is biased by {' and '.join(names)}: {removed:.2%} of the light was removed; the estimated "
+        "error does not include this bias"
+    ]
 
 
 def black_warnings(settings: RenderSettings, features: Iterable[str], brightest: float, cause: str) -> list[str]:
@@ -52,8 +60,11 @@ class PictureWarnings:
     def __init__(self, scene: Scene, features: Iterable[str]) -> None:
         self._scene, self._features, self._logged = scene, list(features), set[str]()
         self._backward = backward_emitters(scene) if _shows_light(scene.render) else []
-        self._of_scene = [f'the emissive mesh "{name}" emits light only away from the scene; reverse the order of its '
-                          "faces' vertices, or set double_sided = true in its material" for name in self._backward]
+        self._of_scene = [
+            f'the emissive mesh "{name}" emits light only away from the scene; reverse the order of its '
+            "faces' vertices, or set double_sided = true in its material"
+            for name in self._backward
+        ]
         if _shows_light(scene.render) and _is_dark(self._features):
             self._of_scene.append("the image is black: nothing in this scene emits light")
         for text in self._of_scene:
@@ -74,8 +85,11 @@ class PictureWarnings:
         settings = self._scene.render
         if film.size != settings.size or not film.samples:
             return []
-        return [*nonfinite_warnings(film.nonfinite_samples, film.samples), *bias_warnings(settings, film.clamped_part),
-                *black_warnings(settings, self._features, float(film.mean.max()), self._cause(film))]
+        return [
+            *nonfinite_warnings(film.nonfinite_samples, film.samples),
+            *bias_warnings(settings, film.clamped_part),
+            *black_warnings(settings, self._features, float(film.mean.max()), self._cause(film)),
+        ]
 
     def _cause(self, film: Film) -> str:
         """Return the likely cause of an image without any light."""

@@ -56,8 +56,12 @@ class Renderer:
         self._checkpoints, kept = open_checkpoints(checkpoints_of(options), self.scene, self.choices, self.name)
         on_phase("compile")
         self._planned_spp = kept.planned_spp if kept else most_planned(options.get("spp"), self.settings.adaptive)
-        self._progress = Progress(self._make_picture(before.session.scenes if before else ()), self._planned_spp,
-                                  percentile, self._checkpoints)
+        self._progress = Progress(
+            self._make_picture(before.session.scenes if before else ()),
+            self._planned_spp,
+            percentile,
+            self._checkpoints,
+        )
         self._aovs.begin(self.session, self.scene)
         self._turns = ThreadTurns()
         self._asked_for: Camera | None = None
@@ -143,8 +147,14 @@ class Renderer:
         else:
             self._progress.session = self._make_picture()
 
-    def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
-               reference: NDArray[np.float32] | None = None) -> Iterator[State]:
+    def passes(
+        self,
+        *,
+        spp: int | None = None,
+        time: float | None = None,
+        error: float | None = None,
+        reference: NDArray[np.float32] | None = None,
+    ) -> Iterator[State]:
         """Render, yielding a State at powers of two of the sample count, at intervals between them, and at the end.
 
         Stops at `spp` samples per pixel, after `time` seconds or at an estimated error of `error` (√relMSE), whichever
@@ -163,8 +173,9 @@ class Renderer:
             if self._checkpoints is not None:
                 self._checkpoints.wait()
 
-    def _states(self, limits: StopConditions, reference: NDArray[np.float32] | None,
-                watch: AwakeClock) -> Iterator[State]:
+    def _states(
+        self, limits: StopConditions, reference: NDArray[np.float32] | None, watch: AwakeClock
+    ) -> Iterator[State]:
         self._see()
         yield from PassLoop(self._progress, limits, reference, watch).states()
 

@@ -25,8 +25,11 @@ class PictureOptions(TypedDict, total=False):
     """Fields of RenderSettings; those left out, or None, are the scene's."""
 
     size: tuple[int, int] | None
-    spp: Annotated[int | None, "Planned samples per pixel: the sampler makes neighboring pixels' errors differ at "
-                               "this count and starts afresh after it (kernels/sampler); `passes` stops there."]
+    spp: Annotated[
+        int | None,
+        "Planned samples per pixel: the sampler makes neighboring pixels' errors differ at "
+        "this count and starts afresh after it (kernels/sampler); `passes` stops there.",
+    ]
     max_depth: int | None
     seed: int | None
     integrator: Integrator | None
@@ -66,13 +69,19 @@ class RendererOptions(PictureOptions, TracingOptions, CheckpointOptions, total=F
     """Keywords of `Renderer`."""
 
     device: Annotated[Selectors, "See `clrt devices`, or an open device; several render one image together."]
-    error_percentile: Annotated[float | None, "A target error counts as reached once this percentage of the tiles of "
-                                              "8x8 pixels has reached it."]
+    error_percentile: Annotated[
+        float | None, "A target error counts as reached once this percentage of the tiles of 8x8 pixels has reached it."
+    ]
     aovs: Annotated[str | Iterable[str] | None, "Names of AOVs to render as well (docs/aovs.md)."]
-    on_phase: Annotated[Callable[[str], None] | None, 'Called with "build" (packing, BVH build) and "compile" (program '
-                                                      'build, upload) as each begins.']
-    before: Annotated[Renderer | None, "A renderer no longer needed; its device resources are reused as far as its "
-                                       "scene consists of the same objects, unmodified."]
+    on_phase: Annotated[
+        Callable[[str], None] | None,
+        'Called with "build" (packing, BVH build) and "compile" (program build, upload) as each begins.',
+    ]
+    before: Annotated[
+        Renderer | None,
+        "A renderer no longer needed; its device resources are reused as far as its "
+        "scene consists of the same objects, unmodified.",
+    ]
 
 
 def settings_of(settings: RenderSettings, options: Mapping[str, object]) -> RenderSettings:

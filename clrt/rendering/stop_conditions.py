@@ -80,8 +80,8 @@ class StopConditions:
         return noise is not None and self.error is not None and noise <= self.error
 
     def room(self, done: int) -> int:
-        """Return the samples that a pass after `done` may add to every pixel; 0 if the count is reached or tiles adapt.
-        """
+        """Return the samples that a pass after `done` may add to every pixel; 0 if the count is reached or tiles
+        adapt."""
         ends = self.spp is not None and done >= self.spp or self.adapts(done)
         return 0 if ends else pass_end(done, self.spp, self.error) - done
 

@@ -37,10 +37,14 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
     UsageError for an invalid number.
     """
     if scene.animation is None:
-        raise SceneError(f"{scene.name}: has no animation; write [[keyframe]] tables, or use a turntable (--turntable, "
-                         "clrt.turntable)")
-    if problems := (field_problems(Animation, vars(scene.animation), "animation")
-                    or animation_problems(scene.camera, scene.animation)):
+        raise SceneError(
+            f"{scene.name}: has no animation; write [[keyframe]] tables, or use a turntable (--turntable, "
+            "clrt.turntable)"
+        )
+    if problems := (
+        field_problems(Animation, vars(scene.animation), "animation")
+        or animation_problems(scene.camera, scene.animation)
+    ):
         raise SceneError(problems)
     count = scene.animation.frames
     numbers = range(count) if chosen is None else list(chosen)
@@ -57,24 +61,33 @@ def animation_problems(camera: Camera, animation: Animation) -> list[str]:
     if around is not None and keys:
         return ["animation: has both turntable_seconds and keyframes; keep one of them"]
     if around is None and len(keys) < 2:
-        return [f"animation: has {len(keys) or 'no'} keyframe{'s' * (not keys)} and no turntable_seconds; write two or "
-                "more [[keyframe]] tables"]
+        return [
+            f"animation: has {len(keys) or 'no'} keyframe{'s' * (not keys)} and no turntable_seconds; write two or "
+            "more [[keyframe]] tables"
+        ]
     if around == 0:
         return ["animation.turntable_seconds: is 0; write the duration of one turn"]
     times = [key.time for key in keys]
-    problems = [f"keyframe[{i + 1}].time: {times[i + 1]:g} is not after the previous one, {times[i]:g}; write them "
-                "in ascending order" for i in range(len(times) - 1) if times[i + 1] <= times[i]]
+    problems = [
+        f"keyframe[{i + 1}].time: {times[i + 1]:g} is not after the previous one, {times[i]:g}; write them "
+        "in ascending order"
+        for i in range(len(times) - 1)
+        if times[i + 1] <= times[i]
+    ]
     if not problems and animation.seconds * animation.fps >= MOST_FRAMES:
-        problems = [f"animation: would have {animation.seconds * animation.fps:.9g} frames, more than {MOST_FRAMES}; "
-                    "check the times, in seconds, and fps"]
+        problems = [
+            f"animation: would have {animation.seconds * animation.fps:.9g} frames, more than {MOST_FRAMES}; "
+            "check the times, in seconds, and fps"
+        ]
     return problems or _view_problems(camera, animation)
 
 
 def _view_problems(camera: Camera, animation: Animation) -> list[str]:
     """Return a problem for the first frame whose camera has no valid view direction."""
     moving = _moving(camera, animation, np.arange(animation.frames, dtype=np.float64))
-    position, look_at, up = (moving.get(name, np.array([getattr(camera, name)], np.float64))
-                             for name in ("position", "look_at", "up"))
+    position, look_at, up = (
+        moving.get(name, np.array([getattr(camera, name)], np.float64)) for name in ("position", "look_at", "up")
+    )
     forward = look_at - position
     length, height = np.linalg.norm(forward, axis=1), np.linalg.norm(up, axis=1)
     bad = np.linalg.norm(np.cross(forward, up), axis=1) <= 1e-6 * length * height
@@ -82,8 +95,10 @@ def _view_problems(camera: Camera, animation: Animation) -> list[str]:
         return []
     frame = int(bad.argmax())
     what = "look_at equals its position" if not length[frame % len(length)] else "it looks along its up vector"
-    return [f"animation: in frame {frame}, {frame / animation.fps:g} s after the first, the camera has no orientation: "
-            f"{what}; move a keyframe, or add one in between"]
+    return [
+        f"animation: in frame {frame}, {frame / animation.fps:g} s after the first, the camera has no orientation: "
+        f"{what}; move a keyframe, or add one in between"
+    ]
 
 
 def _cameras(camera: Camera, animation: Animation, numbers: Doubles) -> Iterator[Camera]:

@@ -100,8 +100,7 @@ class Perspective(CameraType):
     def axes(camera: Camera, view: View) -> tuple[Doubles, Doubles, Doubles]:
         focus = (camera.focus_distance or view.distance) if camera.aperture_radius else 1.0
         extent = np.tan(np.radians(camera.fov_degrees) / 2)
-        return (view.right * focus * extent * view.width / view.height, view.up * focus * extent,
-                view.forward * focus)
+        return (view.right * focus * extent * view.width / view.height, view.up * focus * extent, view.forward * focus)
 
 
 class Orthographic(CameraType):
@@ -125,4 +124,7 @@ class Equirectangular(CameraType):
 
 
 CAMERA_TYPES: dict[Projection, type[CameraType]] = {
-    "perspective": Perspective, "orthographic": Orthographic, "equirectangular": Equirectangular}
+    "perspective": Perspective,
+    "orthographic": Orthographic,
+    "equirectangular": Equirectangular,
+}

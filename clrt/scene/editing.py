@@ -29,8 +29,10 @@ def materials_of(scene: Scene) -> dict[str, Material]:
 
 def with_material(scene: Scene, old: Material, new: Material) -> Scene:
     """Return the scene with `new` in place of this very object `old`, also among the scene's named materials."""
-    meshes = {id(mesh): replace(mesh, material=new) if mesh.material is old else mesh
-              for mesh in (*scene.meshes, *meshes_by_id(scene.instances).values())}
+    meshes = {
+        id(mesh): replace(mesh, material=new) if mesh.material is old else mesh
+        for mesh in (*scene.meshes, *meshes_by_id(scene.instances).values())
+    }
 
     def changed(instance: Instance) -> Instance:
         mesh: Mesh = meshes[id(instance.mesh)]
@@ -40,8 +42,13 @@ def with_material(scene: Scene, old: Material, new: Material) -> Scene:
 
     spheres: list[Sphere] = [replace(each, material=new) if each.material is old else each for each in scene.spheres]
     named = {name: new if material is old else material for name, material in scene.materials.items()}
-    return replace(scene, meshes=[meshes[id(mesh)] for mesh in scene.meshes], spheres=spheres, materials=named,
-                   instances=[changed(instance) for instance in scene.instances])
+    return replace(
+        scene,
+        meshes=[meshes[id(mesh)] for mesh in scene.meshes],
+        spheres=spheres,
+        materials=named,
+        instances=[changed(instance) for instance in scene.instances],
+    )
 
 
 def free_name(name: str, taken: Container[str], numbers: dict[str, int] | None = None) -> str:

@@ -105,8 +105,14 @@ class BaseLight:
 
     def in_unit(self: Self, unit: float) -> Self:
         """Return the light for a scene whose lengths are all multiplied by `unit`; it is not moved."""
-        return replace(self, **{name: _times(value, unit**LENGTHS[name]) for name, value in vars(self).items()
-                                if name in LENGTHS and value is not None})
+        return replace(
+            self,
+            **{
+                name: _times(value, unit ** LENGTHS[name])
+                for name, value in vars(self).items()
+                if name in LENGTHS and value is not None
+            },
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,19 +152,28 @@ class SpotLight(BaseLight):
 
     def parameters(self) -> dict[str, float | Vector]:
         inner, outer = one_minus_cos(self.inner_degrees), one_minus_cos(self.outer_degrees)
-        return {"position": self.position, "axis": unit_vector(self.direction), "intensity": self.intensity,
-                "outer": outer, "slope": 1 / max(outer - inner, STEEPEST), "per_range2": _per_range2(self.range)}
+        return {
+            "position": self.position,
+            "axis": unit_vector(self.direction),
+            "intensity": self.intensity,
+            "outer": outer,
+            "slope": 1 / max(outer - inner, STEEPEST),
+            "per_range2": _per_range2(self.range),
+        }
 
     def bounds(self) -> Bounds:
-        return Bounds(self.position, self.intensity, axis=unit_vector(self.direction),
-                      height=one_minus_cos(self.outer_degrees))
+        return Bounds(
+            self.position, self.intensity, axis=unit_vector(self.direction), height=one_minus_cos(self.outer_degrees)
+        )
 
     def features(self) -> frozenset[str]:
         return frozenset({"LIGHT_CONES", "LIGHT_RANGES"} if self.range else {"LIGHT_CONES"})
 
     def conflicts(self) -> list[str]:
-        fault = (f"inner_degrees: {self.inner_degrees:g} is not below outer_degrees, {self.outer_degrees:g}; write a "
-                 "smaller angle")
+        fault = (
+            f"inner_degrees: {self.inner_degrees:g} is not below outer_degrees, {self.outer_degrees:g}; write a "
+            "smaller angle"
+        )
         return super().conflicts() + ([] if self.inner_degrees < self.outer_degrees else [fault])
 
 
@@ -203,7 +218,7 @@ class DirectionalLight(BaseLight):
         towards = unit_vector(self.direction, -1)
         if self.sampled_by == "directional":
             return DistantBounds(towards, self.irradiance)
-        height = float(np.float32(one_minus_cos(self.angle_degrees / 2)))    # the disc that the kernel samples
+        height = float(np.float32(one_minus_cos(self.angle_degrees / 2)))  # the disc that the kernel samples
         sine2 = height * (2 - height)
         return DistantBounds(towards, self.radiance, pi * sine2, sqrt(sine2))
 

@@ -144,8 +144,10 @@ class Source:
     @property
     def paths(self) -> list[Path]:
         """Return the files of meshes, textures and environment maps."""
-        return [*(origin.table["file"] for origin in self.meshes if "file" in origin.table),
-                *(path for _, path in self.files)]
+        return [
+            *(origin.table["file"] for origin in self.meshes if "file" in origin.table),
+            *(path for _, path in self.files),
+        ]
 
     def file_of(self, content: object) -> Path | None:
         """Return the file that this very picture or image object was read from."""

@@ -34,7 +34,8 @@ class RenderSettings:
     size: tuple[Pixels, Pixels] = option((512, 512), "Image size in pixels.")
     spp: Annotated[int, Ge(1)] = option(64, "Samples per pixel.")
     max_depth: Annotated[int, Ge(1), Le(1024)] = option(
-        8, "Maximum path depth: 1 emission only, 2 direct light, 3 one bounce.")
+        8, "Maximum path depth: 1 emission only, 2 direct light, 3 one bounce."
+    )
     seed: Annotated[int, Ge(0), Lt(2**32)] = option(0, "Seed of the random number generator.")
     integrator: Integrator = option("path", "Integrator; default: the scene's.")
     shadows: bool = option(True, "Whether local and raster cast shadow rays.")
@@ -42,11 +43,14 @@ class RenderSettings:
     filter: Filter = option("box", "Pixel filter; default: the scene's.")
     adaptive: bool = option(False, "Take more samples where the error is larger.")
     back_face_culling: Culling = option(
-        "none", "Which rays ignore the back faces of materials that are not double-sided.")
+        "none", "Which rays ignore the back faces of materials that are not double-sided."
+    )
     clamp_direct: NonNegative = option(
-        0.0, "Clamp each contribution of direct light to a sample to this value; 0: no clamp.")
+        0.0, "Clamp each contribution of direct light to a sample to this value; 0: no clamp."
+    )
     clamp_indirect: NonNegative = option(
-        0.0, "The same for indirect light: fewer fireflies, but the image is biased (too dark).")
+        0.0, "The same for indirect light: fewer fireflies, but the image is biased (too dark)."
+    )
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)

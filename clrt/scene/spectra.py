@@ -58,8 +58,9 @@ D65 = _table("""
 """)
 WAVELENGTHS = np.linspace(SHORTEST, LONGEST, STEPS)
 #: Matrix from XYZ to linear Rec. 709 (ITU-R BT.709), where a unit spectrum has Y = 1.
-RGB_FROM_XYZ = np.array([[3.240479, -1.537150, -0.498535], [-0.969256, 1.875991, 0.041556],
-                         [0.055648, -0.204043, 1.057311]])
+RGB_FROM_XYZ = np.array(
+    [[3.240479, -1.537150, -0.498535], [-0.969256, 1.875991, 0.041556], [0.055648, -0.204043, 1.057311]]
+)
 #: Wavelengths in nm at which spectra are sampled for integration.
 FINE = np.linspace(SHORTEST, LONGEST, 4701)
 

@@ -26,8 +26,10 @@ def smooth(times: ArrayLike, values: ArrayLike, at: ArrayLike) -> Doubles:
     length = lengths[piece]
     t = (moments - knots[piece])[:, None] / length
     rest = 1 - t
-    return np.asarray(rest**2 * ((1 + 2 * t) * points[piece] + t * length * slopes[piece])
-                      + t**2 * ((1 + 2 * rest) * points[piece + 1] - rest * length * slopes[piece + 1]))
+    return np.asarray(
+        rest**2 * ((1 + 2 * t) * points[piece] + t * length * slopes[piece])
+        + t**2 * ((1 + 2 * rest) * points[piece + 1] - rest * length * slopes[piece + 1])
+    )
 
 
 def _slopes(lengths: Doubles, secants: Doubles) -> Doubles:

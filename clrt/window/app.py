@@ -28,8 +28,9 @@ ADD_ONS = immapp.AddOnsParams(with_implot=True)
 class App:
     """A window on a live session of its own. `params`: the parameters of Dear ImGui's runner."""
 
-    def __init__(self, scene: Scene, settings: Settings = Settings(),
-                 look: DisplaySettings = DisplaySettings()) -> None:
+    def __init__(
+        self, scene: Scene, settings: Settings = Settings(), look: DisplaySettings = DisplaySettings()
+    ) -> None:
         # Before OpenGL is loaded: libraries loaded later would get Mesa's LLVM, and PoCL aborts with a foreign one.
         devices = [info for info, _ in find_devices() if info.usable]
         self.live = Live(scene, settings=settings)
@@ -74,9 +75,16 @@ class App:
     def _panels(self) -> list[hello_imgui.DockableWindow]:
         places: dict[str, dict[str, Callable[[Editor], None]]] = {
             "MainDockSpace": {"Picture": self.viewport.show},
-            "Panels": {SPHERES: spheres.show, MATERIALS: materials.show, "Lights": Lights().show,
-                       "Camera": CameraPanel().show, "Render": render.show, "File": Files().show},
-            "Figures": {"Statistics": statistics.show}}
+            "Panels": {
+                SPHERES: spheres.show,
+                MATERIALS: materials.show,
+                "Lights": Lights().show,
+                "Camera": CameraPanel().show,
+                "Render": render.show,
+                "File": Files().show,
+            },
+            "Figures": {"Statistics": statistics.show},
+        }
         return [self._panel(place, name, show) for place, panels in places.items() for name, show in panels.items()]
 
     def _panel(self, place: str, name: str, show: Callable[[Editor], None]) -> hello_imgui.DockableWindow:
@@ -94,5 +102,7 @@ class App:
 
 def _splits() -> list[hello_imgui.DockingSplit]:
     """Return the layout: the viewport on the left; panels on the right, and statistics below them."""
-    return [hello_imgui.DockingSplit("MainDockSpace", "Panels", imgui.Dir.right, 0.34),
-            hello_imgui.DockingSplit("Panels", "Figures", imgui.Dir.down, 0.45)]
+    return [
+        hello_imgui.DockingSplit("MainDockSpace", "Panels", imgui.Dir.right, 0.34),
+        hello_imgui.DockingSplit("Panels", "Figures", imgui.Dir.down, 0.45),
+    ]

@@ -11,8 +11,14 @@ from ..scene.model import Camera
 from .navigation import approached, distance, has_axes, orbited, shifted, turned, walked
 
 #: Keys, and the direction in which they walk: right, up, forward.
-KEYS = {imgui.Key.d: (1, 0, 0), imgui.Key.a: (-1, 0, 0), imgui.Key.e: (0, 1, 0), imgui.Key.q: (0, -1, 0),
-        imgui.Key.w: (0, 0, 1), imgui.Key.s: (0, 0, -1)}
+KEYS = {
+    imgui.Key.d: (1, 0, 0),
+    imgui.Key.a: (-1, 0, 0),
+    imgui.Key.e: (0, 1, 0),
+    imgui.Key.q: (0, -1, 0),
+    imgui.Key.w: (0, 0, 1),
+    imgui.Key.s: (0, 0, -1),
+}
 #: Speed factor with Shift.
 FASTER = 5.0
 #: Factor of the distance per notch of the wheel.

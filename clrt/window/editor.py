@@ -158,6 +158,7 @@ class Editor:
 
     def _beside(self, path: Path, done: str, do: Callable[[], object]) -> None:
         """Run a file operation in the background. done: the message about the file on success."""
+
         def work() -> None:
             try:
                 self.attempt(do)

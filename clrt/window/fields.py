@@ -126,8 +126,11 @@ def _edit_tuple(label: str, kinds: tuple[Any, ...], value: tuple[Any, ...], step
         changed, parts = drag(label, value, _speed(max(map(abs, value)), step), format="%.5g")
     if not changed:
         return value
-    return tuple(old if part == np.float32(old) else _shortest(limit.clamp(part), kind)
-                 for part, old, limit, kind in zip(parts, value, limits, kinds) if limit is not None)
+    return tuple(
+        old if part == np.float32(old) else _shortest(limit.clamp(part), kind)
+        for part, old, limit, kind in zip(parts, value, limits, kinds)
+        if limit is not None
+    )
 
 
 def _number(hint: Any, step: float, label: str, value: float) -> tuple[bool, float]:

@@ -10,8 +10,11 @@ from .editor import Editor
 from .tone_mapping import ToneMapped
 
 LEFT = imgui.MouseButton_.left.value
-ANY_BUTTON = (imgui.ButtonFlags_.mouse_button_left.value | imgui.ButtonFlags_.mouse_button_middle.value
-              | imgui.ButtonFlags_.mouse_button_right.value)
+ANY_BUTTON = (
+    imgui.ButtonFlags_.mouse_button_left.value
+    | imgui.ButtonFlags_.mouse_button_middle.value
+    | imgui.ButtonFlags_.mouse_button_right.value
+)
 
 
 class Viewport:
@@ -52,6 +55,8 @@ class Viewport:
         start, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
         factor = max(min(room.x / size[0], room.y / size[1]), 1 / min(size))
         self.size = max(1, floor(size[0] * factor)), max(1, floor(size[1] * factor))
-        self.corner = (floor(start.x + max(room.x - self.size[0], 0) / 2),
-                       floor(start.y + max(room.y - self.size[1], 0) / 2))
+        self.corner = (
+            floor(start.x + max(room.x - self.size[0], 0) / 2),
+            floor(start.y + max(room.y - self.size[1], 0) / 2),
+        )
         imgui.set_cursor_screen_pos(ImVec2(*self.corner))

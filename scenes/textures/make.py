@@ -54,7 +54,7 @@ def normals(height: Doubles) -> Doubles:
     """The normal map of a height, in widths of the picture, that is repeated on all sides."""
     slope_x = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * len(height) / 2
     slope_y = (np.roll(height, -1, 0) - np.roll(height, 1, 0)) * len(height) / 2
-    n = np.stack([-slope_x, slope_y, np.ones_like(height)], -1)     # v points down, the map's y up
+    n = np.stack([-slope_x, slope_y, np.ones_like(height)], -1)  # v points down, the map's y up
     return 0.5 + 0.5 * n / np.linalg.norm(n, axis=-1, keepdims=True)
 
 
@@ -156,8 +156,13 @@ def leaf() -> None:
 def pixels() -> None:
     """Eight by eight, for the filter that keeps them square: a cow's head."""
     rows = ["o..xx..o", "ooxxxxoo", ".xxxxxx.", ".xkxxkx.", ".xxxxxx.", "..pppp..", "..pkkp..", "...pp..."]
-    paints = {".": (0.42, 0.68, 0.86), "x": (0.93, 0.91, 0.86), "o": (0.62, 0.45, 0.3), "k": (0.1, 0.09, 0.1),
-              "p": (0.93, 0.6, 0.58)}
+    paints = {
+        ".": (0.42, 0.68, 0.86),
+        "x": (0.93, 0.91, 0.86),
+        "o": (0.62, 0.45, 0.3),
+        "k": (0.1, 0.09, 0.1),
+        "p": (0.93, 0.6, 0.58),
+    }
     save("pixels.png", np.array([[paints[letter] for letter in row] for row in rows]))
 
 

@@ -94,9 +94,15 @@ def scaled(triangles: FloatArray) -> FloatArray:
 NO_SPHERES = spheres(0)
 #: Triangles and spheres, at least two in all, as input of a device's builder.
 SCENES: dict[str, tuple[FloatArray, FloatArray]] = {
-    name: (scaled(triangles), NO_SPHERES) for name, triangles in NASTY.items() if len(triangles) > 1}
+    name: (scaled(triangles), NO_SPHERES) for name, triangles in NASTY.items() if len(triangles) > 1
+}
 SCENES |= {
-    "eight": (soup(8), NO_SPHERES), "nine": (soup(9), NO_SPHERES), "blocks": (soup(20_000, 0.01), spheres(37)),
+    "eight": (soup(8), NO_SPHERES),
+    "nine": (soup(9), NO_SPHERES),
+    "blocks": (soup(20_000, 0.01), spheres(37)),
     "room": (np.concatenate([soup(2000, 0.01) * np.float32(0.3), box(-1, 1)]), NO_SPHERES),
-    "mixed": (soup(600), spheres(300)), "one_of_each": (soup(1), spheres(1)), "spheres": (soup(0), spheres(700)),
-    "equal_spheres": (soup(0), np.repeat(spheres(3), 50, axis=0))}
+    "mixed": (soup(600), spheres(300)),
+    "one_of_each": (soup(1), spheres(1)),
+    "spheres": (soup(0), spheres(700)),
+    "equal_spheres": (soup(0), np.repeat(spheres(3), 50, axis=0)),
+}

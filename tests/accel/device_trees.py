@@ -57,8 +57,9 @@ def wide_tree(device: Device, layout: str, case: str) -> WideBvh:
     if "packs" in tree.buffers:
         order = tree.buffers["packs"]["primitive"].ravel()
     balls = tree.buffers["leaf_spheres"]["primitive"] if "leaf_spheres" in tree.buffers else order[:0]
-    return WideBvh(nodes["lo"].transpose(0, 2, 1), nodes["hi"].transpose(0, 2, 1), child, order,
-                   balls - np.int32(triangle_count))
+    return WideBvh(
+        nodes["lo"].transpose(0, 2, 1), nodes["hi"].transpose(0, 2, 1), child, order, balls - np.int32(triangle_count)
+    )
 
 
 def binary_tree(device: Device, case: str) -> Bvh:
@@ -68,8 +69,15 @@ def binary_tree(device: Device, case: str) -> Bvh:
     shift = np.where(nodes["count"] == 0, -1, np.where(nodes["count"] < 0, triangle_count, 0))
     leaves = [buffers[name]["primitive"] for name in ("leaf_triangles", "leaf_spheres") if name in buffers]
     order = np.concatenate(leaves)
-    return Bvh(nodes["aabb_min"], nodes["aabb_max"], (nodes["left_first"] + shift).astype(np.int32),
-               np.abs(nodes["count"]), np.zeros(len(nodes), bool), order, order[:0])
+    return Bvh(
+        nodes["aabb_min"],
+        nodes["aabb_max"],
+        (nodes["left_first"] + shift).astype(np.int32),
+        np.abs(nodes["count"]),
+        np.zeros(len(nodes), bool),
+        order,
+        order[:0],
+    )
 
 
 @dataclass(frozen=True)
@@ -123,5 +131,6 @@ def binary(device: Device, layout: str, case: str, passes: int = 0) -> Binary:
     ball_low, ball_high = sphere_boxes(balls)
     triangle_low, triangle_high = edges(triangles)
     low, high = np.concatenate([triangle_low, ball_low]), np.concatenate([triangle_high, ball_high])
-    return Binary(work.download(tree.nodes, BINARY_NODE, tree.count), tree.rounds, ids >= len(triangles), low[ids],
-                  high[ids])
+    return Binary(
+        work.download(tree.nodes, BINARY_NODE, tree.count), tree.rounds, ids >= len(triangles), low[ids], high[ids]
+    )

@@ -18,8 +18,9 @@ from .cases import soup, spheres
 
 
 @covering("layout, builder", SHAPES, ["ploc", "reinsertion"])
-def test_no_array_is_larger_than_foretold(device: Device, monkeypatch: pytest.MonkeyPatch, layout: str,
-                                          builder: str) -> None:
+def test_no_array_is_larger_than_foretold(
+    device: Device, monkeypatch: pytest.MonkeyPatch, layout: str, builder: str
+) -> None:
     """Tests clustered triangles, large overlapping ones, and triangles with spheres."""
     sizes: list[int] = []
     counted = DataParallel._counted

@@ -55,8 +55,10 @@ COORDINATES = st.floats(width=32, allow_nan=False, allow_infinity=False) | st.sa
 
 
 @settings(deadline=None)
-@given(corners=st.integers(1, 40).flatmap(lambda count: arrays(np.float32, (count, 2, 3), elements=COORDINATES)),
-       configuration=st.sampled_from(CONFIGURATIONS))
+@given(
+    corners=st.integers(1, 40).flatmap(lambda count: arrays(np.float32, (count, 2, 3), elements=COORDINATES)),
+    configuration=st.sampled_from(CONFIGURATIONS),
+)
 def test_any_finite_boxes_give_a_sound_tree(corners: FloatArray, configuration: tuple[str, int, int]) -> None:
     low, high = corners.min(axis=1), corners.max(axis=1)
     builder, leaf_size, pack = configuration
@@ -98,6 +100,7 @@ def test_cost_of_a_tree_by_hand() -> None:
 
 def sweep_cost(low: NDArray[np.float64], high: NDArray[np.float64], leaf_size: int, pack: int) -> float:
     """Return SAH cost times half area of the BVH that tries every split of the sorted centroids on every axis."""
+
     def area(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
         x, y, z = high.max(axis=0) - low.min(axis=0)
         return float(x * y + y * z + z * x)
@@ -111,8 +114,9 @@ def sweep_cost(low: NDArray[np.float64], high: NDArray[np.float64], leaf_size: i
         order = np.argsort(low[:, axis] + high[:, axis], kind="stable")
         for cut in range(1, count):
             left, right = order[:cut], order[cut:]
-            cost = (area(low[left], high[left]) * math.ceil(cut / pack)
-                    + area(low[right], high[right]) * math.ceil((count - cut) / pack))
+            cost = area(low[left], high[left]) * math.ceil(cut / pack) + area(low[right], high[right]) * math.ceil(
+                (count - cut) / pack
+            )
             if cost < best:
                 best, parts = cost, (left, right)
     if count <= leaf_size and as_leaf <= area(low, high) + best:
@@ -138,10 +142,15 @@ def test_joined_trees_keep_their_leaves(triangle_count: int, sphere_count: int) 
     ball_low, ball_high = balls[:, :3] - balls[:, 3:], balls[:, :3] + balls[:, 3:]
     tree = join(sah(low, high, 4), midpoint(ball_low, ball_high))
     # With the spheres renumbered after the triangles, the joined BVH is a valid BVH over both.
-    both = Bvh(tree.aabb_min, tree.aabb_max,
-               np.where(tree.spheres, tree.left_first + triangle_count, tree.left_first).astype(np.int32), tree.count,
-               tree.spheres, np.concatenate([tree.order, tree.sphere_order + triangle_count]).astype(np.int32),
-               tree.sphere_order[:0])
+    both = Bvh(
+        tree.aabb_min,
+        tree.aabb_max,
+        np.where(tree.spheres, tree.left_first + triangle_count, tree.left_first).astype(np.int32),
+        tree.count,
+        tree.spheres,
+        np.concatenate([tree.order, tree.sphere_order + triangle_count]).astype(np.int32),
+        tree.sphere_order[:0],
+    )
     check(both, np.concatenate([low, ball_low]), np.concatenate([high, ball_high]), 4)
     assert not tree.spheres[tree.count == 0].any()
     assert tree.count[tree.spheres].sum() == sphere_count

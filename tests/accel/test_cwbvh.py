@@ -24,7 +24,10 @@ from .test_layouts import SCENES
 Doubles = NDArray[np.float64]
 Group = list[int]  # nodes that are still to be visited
 CASES = {name: (corners, spheres(0)) for name, corners in NASTY.items() if name != "none"} | {
-    "mixed": SCENES["mixed"], "spheres": SCENES["spheres"], "one_sphere": SCENES["one_sphere"]}
+    "mixed": SCENES["mixed"],
+    "spheres": SCENES["spheres"],
+    "one_sphere": SCENES["one_sphere"],
+}
 
 
 def children_of(node: Any) -> Iterator[tuple[int, int]]:
@@ -55,8 +58,8 @@ def boxes_below(layout: Layout) -> tuple[FloatArray, FloatArray]:
     below_max = -below_min
     for index in reversed(range(len(nodes))):
         for slot, first, count in leaves_of(nodes[index]):
-            below_min[index, slot] = lows[first:first + count].min(axis=0)
-            below_max[index, slot] = highs[first:first + count].max(axis=0)
+            below_min[index, slot] = lows[first : first + count].min(axis=0)
+            below_max[index, slot] = highs[first : first + count].max(axis=0)
         for slot, child in children_of(nodes[index]):
             below_min[index, slot], below_max[index, slot] = below_min[child].min(axis=0), below_max[child].max(axis=0)
     return below_min, below_max
@@ -94,9 +97,16 @@ def test_rays_enter_the_boxes_of_what_they_hit(case: str) -> None:
     size = np.float32(np.ptp(np.concatenate([low[used], high[used]])))
     rng, own, slot = np.random.default_rng(0), nodes["origin"], np.argmax(used[:, 0], axis=1)
     planes = [np.take_along_axis(box, slot[:, None, None], axis=2)[..., 0].astype(np.float32) for box in (low, high)]
-    origins = [0 * own, own, *planes, np.nextafter(planes[0], -size), np.nextafter(planes[1], size),
-               own - 1000 * size, own + np.float32(1e6) * size,
-               *(own + size * rng.random(own.shape, np.float32) for _ in range(4))]
+    origins = [
+        0 * own,
+        own,
+        *planes,
+        np.nextafter(planes[0], -size),
+        np.nextafter(planes[1], size),
+        own - 1000 * size,
+        own + np.float32(1e6) * size,
+        *(own + size * rng.random(own.shape, np.float32) for _ in range(4)),
+    ]
     for origin in origins:
         for direction in (1.0, -1.0, 0.3, -1e-6, 777.7):
             near, far = slab(nodes, origin, np.float32(direction))
@@ -109,8 +119,11 @@ def test_rays_enter_the_boxes_of_what_they_hit(case: str) -> None:
 
 
 @settings(deadline=None)
-@given(corners=arrays(np.float32, (2, 8, 3), elements=st.floats(width=32, allow_nan=False, allow_infinity=False)),
-       count=st.integers(0, 8), flat=st.booleans())
+@given(
+    corners=arrays(np.float32, (2, 8, 3), elements=st.floats(width=32, allow_nan=False, allow_infinity=False)),
+    count=st.integers(0, 8),
+    flat=st.booleans(),
+)
 def test_quantised_boxes_enclose_and_fit(corners: FloatArray, count: int, flat: bool) -> None:
     """In exact arithmetic, for any finite boxes: planes enclose the child within a step, which is not too large."""
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -222,6 +235,9 @@ def test_no_order_of_visits_passes_the_bound(case: str) -> None:
     corners, rng = NASTY[case], np.random.default_rng(1)
     tree = compress(sah(corners.min(axis=1), corners.max(axis=1), MAX_LEAF))
     orders: list[Callable[[Group], int]] = [min, max, *[lambda group: int(rng.choice(group))] * 8]
-    most = [fullest(tree.nodes, choose, enters) for choose in orders
-            for enters in (lambda: True, lambda: bool(rng.random() < 0.8))]
+    most = [
+        fullest(tree.nodes, choose, enters)
+        for choose in orders
+        for enters in (lambda: True, lambda: bool(rng.random() < 0.8))
+    ]
     assert 0 < max(most) <= tree.stack

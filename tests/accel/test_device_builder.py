@@ -69,8 +69,10 @@ def test_boxes_are_tight(device: Device, case: str) -> None:
     corners = np.stack([packs[name] for name in ("p0", "p1", "p2")]).transpose(1, 3, 0, 2)
     low, high = (each.reshape(-1, 8, 3) for each in edges(corners.reshape(-1, 3, 3)))
     bounds = sphere_boxes(SCENES[case][1][wide.sphere_order])
-    for boxes, union, ends, sides in ((wide.aabb_min, np.minimum, np.fmin.reduce(low, axis=1), bounds[0]),
-                                      (wide.aabb_max, np.maximum, np.fmax.reduce(high, axis=1), bounds[1])):
+    for boxes, union, ends, sides in (
+        (wide.aabb_min, np.minimum, np.fmin.reduce(low, axis=1), bounds[0]),
+        (wide.aabb_max, np.maximum, np.fmax.reduce(high, axis=1), bounds[1]),
+    ):
         np.testing.assert_array_equal(boxes[triangles], ends[first[triangles] // 8])
         if balls.any():
             order = np.argsort(first[balls])

@@ -30,8 +30,9 @@ def check_leaf_records(layout: Layout, case: str) -> None:
     if len(balls):
         records = layout.buffers["leaf_spheres"]
         np.testing.assert_array_equal(np.sort(records["primitive"]), len(triangles) + np.arange(len(balls)))
-        np.testing.assert_array_equal(np.column_stack([records["center"], records["radius"]]),
-                                      balls[records["primitive"] - len(triangles)])
+        np.testing.assert_array_equal(
+            np.column_stack([records["center"], records["radius"]]), balls[records["primitive"] - len(triangles)]
+        )
 
 
 @pytest.mark.parametrize("case", SCENES)

@@ -34,8 +34,9 @@ def test_clusters_form_a_tree_of_bounded_depth(device: Device, case: str) -> Non
 
 @pytest.mark.parametrize("case", SCENES)
 @pytest.mark.parametrize("gpu", [False, True], ids=["alone", "together"])
-def test_the_last_rounds_are_those_of_many(device: Device, case: str, gpu: bool,
-                                           monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_last_rounds_are_those_of_many(
+    device: Device, case: str, gpu: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """One work-group, of one item or many, makes the same nodes as one launch per round."""
     device = like_gpu(device) if gpu else device
     few = binary(device, "bvh8", case)
@@ -81,9 +82,11 @@ def boxes_and_visits(device: Device, layout: str, case: str) -> tuple[FloatArray
     wide = wide_tree(device, layout, case)
     leaf = wide.child < 0
     _, sphere, count = leaf_fields(wide.child[leaf])
-    return (np.concatenate([wide.aabb_min.min(axis=1), wide.aabb_min[leaf]]),
-            np.concatenate([wide.aabb_max.max(axis=1), wide.aabb_max[leaf]]),
-            np.concatenate([np.ones(len(leaf)), intersections(count, sphere, SHAPES[layout].pack)]))
+    return (
+        np.concatenate([wide.aabb_min.min(axis=1), wide.aabb_min[leaf]]),
+        np.concatenate([wide.aabb_max.max(axis=1), wide.aabb_max[leaf]]),
+        np.concatenate([np.ones(len(leaf)), intersections(count, sphere, SHAPES[layout].pack)]),
+    )
 
 
 @pytest.mark.parametrize("case", ["nine", "spheres", "long_diagonals", "duplicates", "teapot_in_a_stadium", "room"])
@@ -113,8 +116,9 @@ def test_sums_of_what_stands_before(device: Device, groups: bool, count: int, ar
     array = work.upload(values)
     work.scan(array, count, arrays)
     assert work.sums(arrays) == values.sum(axis=1).tolist()
-    np.testing.assert_array_equal(work.download(array, np.uint32, values.size).reshape(values.shape),
-                                  np.cumsum(values, axis=1) - values)
+    np.testing.assert_array_equal(
+        work.download(array, np.uint32, values.size).reshape(values.shape), np.cumsum(values, axis=1) - values
+    )
 
 
 @pytest.mark.parametrize("case", ["mixed", "flat_grid", "points"])

@@ -49,9 +49,11 @@ def test_every_triangle_is_in_one_pack_and_rays_pay_no_more(seed: int) -> None:
     assert paid(triangles, made) < paid(triangles, [[*range(k, k + SIZE)] for k in range(0, 48, SIZE)])
 
 
-@pytest.mark.parametrize("triangles", [soup(0), soup(1), box(0, 1), np.ones((40, 3, 3), np.float32),
-                                       np.repeat(soup(1), 40, axis=0), soup(MOST + 1)],
-                         ids=["none", "one", "few", "points", "copies", "many"])
+@pytest.mark.parametrize(
+    "triangles",
+    [soup(0), soup(1), box(0, 1), np.ones((40, 3, 3), np.float32), np.repeat(soup(1), 40, axis=0), soup(MOST + 1)],
+    ids=["none", "one", "few", "points", "copies", "many"],
+)
 def test_what_cannot_be_grouped_is_taken_in_its_order(triangles: Floats) -> None:
     made = packs(triangles)
     assert made == [[*range(k, min(k + SIZE, len(triangles)))] for k in range(0, len(triangles), SIZE)]

@@ -89,7 +89,7 @@ def hit_spheres(center: Doubles, radius: Doubles, primitive: NDArray[np.int32], 
     discriminant = b * b - a * (x * x + y * y + z * z - radius * radius)
     hits = []
     for d, b_i, i in zip(discriminant.tolist(), b.tolist(), primitive.tolist()):
-        roots = [(-b_i + side * d ** 0.5) / a for side in (-1, 1)] if d >= 0 else []
+        roots = [(-b_i + side * d**0.5) / a for side in (-1, 1)] if d >= 0 else []
         hits += [(root, i) for root in roots if root > 0][:1]
     return min([*hits, MISS])
 
@@ -97,8 +97,10 @@ def hit_spheres(center: Doubles, radius: Doubles, primitive: NDArray[np.int32], 
 def brute_force(triangles: FloatArray, balls: FloatArray, ray: Ray) -> Hit:
     number = np.arange(len(triangles) + len(balls), dtype=np.int32)
     wide = balls.astype(np.float64)
-    return min(hit_triangles(triangles.astype(np.float64), number[:len(triangles)], ray),
-               hit_spheres(wide[:, :3], wide[:, 3], number[len(triangles):], ray))
+    return min(
+        hit_triangles(triangles.astype(np.float64), number[: len(triangles)], ray),
+        hit_spheres(wide[:, :3], wide[:, 3], number[len(triangles) :], ray),
+    )
 
 
 def triangle_records(records: NDArray[np.void], ray: Ray) -> Hit:
@@ -112,8 +114,9 @@ def pack_record(record: Any, ray: Ray) -> Hit:
 
 
 def sphere_records(records: NDArray[np.void], ray: Ray) -> Hit:
-    return hit_spheres(records["center"].astype(np.float64), records["radius"].astype(np.float64),
-                       records["primitive"], ray)
+    return hit_spheres(
+        records["center"].astype(np.float64), records["radius"].astype(np.float64), records["primitive"], ray
+    )
 
 
 def packed_records(records: NDArray[np.void], ray: Ray) -> Hit:
@@ -126,8 +129,8 @@ def visit_bvh2(layout: Layout, reference: int, ray: Ray) -> Visit:
     if count == 0:
         return [((nodes[i]["aabb_min"], nodes[i]["aabb_max"]), i) for i in (first, first + 1)], MISS
     if count < 0:
-        return [], sphere_records(layout.buffers["leaf_spheres"][first:first - count], ray)
-    return [], triangle_records(layout.buffers["leaf_triangles"][first:first + count], ray)
+        return [], sphere_records(layout.buffers["leaf_spheres"][first : first - count], ray)
+    return [], triangle_records(layout.buffers["leaf_triangles"][first : first + count], ray)
 
 
 def visit_bvh8(layout: Layout, reference: int, ray: Ray) -> Visit:
@@ -136,7 +139,7 @@ def visit_bvh8(layout: Layout, reference: int, ray: Ray) -> Visit:
         return [((node["lo"][:, i], node["hi"][:, i]), int(node["child"][i])) for i in range(8)], MISS
     first, sphere, count = ~reference >> 4, ~reference >> 3 & 1, (~reference & 7) + 1
     if sphere:
-        return [], sphere_records(layout.buffers["leaf_spheres"][first:first + count], ray)
+        return [], sphere_records(layout.buffers["leaf_spheres"][first : first + count], ray)
     record = layout.buffers["packs"][first]
     assert np.count_nonzero(record["primitive"] >= 0) == count
     return [], pack_record(record, ray)
@@ -148,8 +151,8 @@ def visit_cwbvh(layout: Layout, reference: int, ray: Ray) -> Visit:
         first, count = ~reference >> 2, ~reference & 3
         triangles = len(layout.buffers.get("leaf_triangles", ()))
         if first >= triangles:
-            return [], sphere_records(layout.buffers["leaf_spheres"][first - triangles:][:count], ray)
-        return [], triangle_records(layout.buffers["leaf_triangles"][first:first + count], ray)
+            return [], sphere_records(layout.buffers["leaf_spheres"][first - triangles :][:count], ray)
+        return [], triangle_records(layout.buffers["leaf_triangles"][first : first + count], ray)
     node = layout.buffers["nodes"][reference]
     step = np.ldexp(1.0, node["exponent"].astype(int) - 127)
     children, child = [], int(node["child"])
@@ -225,8 +228,9 @@ def test_siblings_of_a_binary_tree_share_a_cache_line() -> None:
 
 def test_a_tree_of_nothing_cannot_be_entered() -> None:
     """Neither the root's box nor, if the root is not tested, its children's can be hit."""
-    binary, wide, compressed = (pack(name, "sah", *SCENES["nothing"]).buffers["nodes"]
-                                for name in ("bvh2", "bvh8", "cwbvh"))
+    binary, wide, compressed = (
+        pack(name, "sah", *SCENES["nothing"]).buffers["nodes"] for name in ("bvh2", "bvh8", "cwbvh")
+    )
     first = binary["left_first"][0]
     assert (binary["count"] == 0).all()
     assert (binary["aabb_min"][[0, first, first + 1]] == np.inf).all()
@@ -237,8 +241,15 @@ def test_a_tree_of_nothing_cannot_be_entered() -> None:
 
 
 def test_records_have_the_sizes_that_the_device_expects() -> None:
-    sizes = {BVH2_NODE: 32, BVH8_NODE: 256, LEAF_TRIANGLE: 48, LEAF_SPHERE: 32, TRIANGLE_PACK: 320, LONE_PACK: 704,
-             CWBVH_NODE: 80}
+    sizes = {
+        BVH2_NODE: 32,
+        BVH8_NODE: 256,
+        LEAF_TRIANGLE: 48,
+        LEAF_SPHERE: 32,
+        TRIANGLE_PACK: 320,
+        LONE_PACK: 704,
+        CWBVH_NODE: 80,
+    }
     assert all(dtype.itemsize == size for dtype, size in sizes.items())
 
 
@@ -262,8 +273,10 @@ def test_boxes_of_spheres_contain_them(balls: FloatArray) -> None:
                 assert Fraction(float(inner[0])) >= exact_low and Fraction(float(inner[1])) <= exact_high
 
 
-@pytest.mark.parametrize("layout, builder, message", [("bvh3", "sah", "'bvh3'.*list, packs, bvh2, bvh8, cwbvh"),
-                                                      ("bvh2", "shah", "'shah'.*sah, midpoint")])
+@pytest.mark.parametrize(
+    "layout, builder, message",
+    [("bvh3", "sah", "'bvh3'.*list, packs, bvh2, bvh8, cwbvh"), ("bvh2", "shah", "'shah'.*sah, midpoint")],
+)
 def test_unknown_names_are_refused(layout: str, builder: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):
         pack(layout, builder, *SCENES["one"])

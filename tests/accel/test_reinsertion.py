@@ -51,6 +51,7 @@ def test_the_same_tree_again_and_everywhere(device: Device, case: str) -> None:
 
 def total_area(below: Children, low: FloatArray, high: FloatArray) -> float:
     """Return half the area of all nodes of a BVH whose node numbers follow the primitives'; the root is the last."""
+
     def of(node: int) -> tuple[FloatArray, FloatArray, float]:
         if node < len(low):
             return low[node], high[node], 0.0
@@ -94,8 +95,9 @@ def test_the_best_move_is_always_made(device: Device, seed: int, monkeypatch: py
     primitives = sort_primitives(work, triangles, NO_SPHERES)
     corners = triangles[work.download(primitives.ids, np.uint32, count)]
     after = reinsert(work, primitives, BinaryTree(work.upload(nodes), [1] * (count - 1)), 1)
-    tree = Binary(work.download(after.nodes, BINARY_NODE, after.count), after.rounds, np.zeros(count, bool),
-                  *edges(corners))
+    tree = Binary(
+        work.download(after.nodes, BINARY_NODE, after.count), after.rounds, np.zeros(count, bool), *edges(corners)
+    )
     tree.check()
     below = replace(tree, nodes=nodes).below.tolist()
     best = min(total_area(moved, tree.low, tree.high) for moved in moves(below, count))

@@ -21,8 +21,10 @@ Children = list[list[int]]  # of every node; a leaf is -1
 
 def mixed_tree(count: int, seed: int = 0) -> Bvh:
     triangles, balls = soup(count, seed=seed), spheres(count // 3, seed)
-    return join(sah(triangles.min(axis=1), triangles.max(axis=1), 8, 8),
-                midpoint(balls[:, :3] - balls[:, 3:], balls[:, :3] + balls[:, 3:]))
+    return join(
+        sah(triangles.min(axis=1), triangles.max(axis=1), 8, 8),
+        midpoint(balls[:, :3] - balls[:, 3:], balls[:, :3] + balls[:, 3:]),
+    )
 
 
 @pytest.mark.parametrize("width", [2, 4, 8])
@@ -33,8 +35,13 @@ def test_leaves_and_their_boxes_stay(count: int, width: int) -> None:
     leaf = wide.child < 0
     first, sphere, size = leaf_fields(wide.child[leaf])
     found = zip(first, sphere, size, wide.aabb_min[leaf].tolist(), wide.aabb_max[leaf].tolist())
-    expected = zip(tree.left_first[tree.leaf], tree.spheres[tree.leaf], tree.count[tree.leaf],
-                   tree.aabb_min[tree.leaf].tolist(), tree.aabb_max[tree.leaf].tolist())
+    expected = zip(
+        tree.left_first[tree.leaf],
+        tree.spheres[tree.leaf],
+        tree.count[tree.leaf],
+        tree.aabb_min[tree.leaf].tolist(),
+        tree.aabb_max[tree.leaf].tolist(),
+    )
     assert sorted(found) == sorted(expected)
 
     np.testing.assert_array_equal(wide.child[wide.interior], np.arange(1, len(wide.child)))
@@ -58,9 +65,12 @@ def least_cost(tree: Bvh, width: int) -> float:
         return sum(1 if tree.count[child] or child in kept else children(child, kept) for child in (first, first + 1))
 
     leaves = float(np.sum(area[tree.leaf] * tree.count[tree.leaf]))
-    costs = [leaves + float(sum(area[list(kept)])) for size in range(len(below) + 1)
-             for kept in ({0, *chosen} for chosen in combinations(below, size))
-             if all(children(node, kept) <= width for node in kept)]
+    costs = [
+        leaves + float(sum(area[list(kept)]))
+        for size in range(len(below) + 1)
+        for kept in ({0, *chosen} for chosen in combinations(below, size))
+        if all(children(node, kept) <= width for node in kept)
+    ]
     return min(costs) / float(area[0])
 
 
@@ -73,8 +83,10 @@ def test_no_wide_tree_costs_less(seed: int, width: int) -> None:
 
 
 def binary_children(tree: Bvh) -> Children:
-    return [[] if count else [child if tree.count[child] == 0 else -1 for child in (first, first + 1)]
-            for first, count in zip(tree.left_first.tolist(), tree.count.tolist())]
+    return [
+        [] if count else [child if tree.count[child] == 0 else -1 for child in (first, first + 1)]
+        for first, count in zip(tree.left_first.tolist(), tree.count.tolist())
+    ]
 
 
 def wide_children(wide: WideBvh) -> Children:
@@ -102,8 +114,13 @@ def fullest_stack(children: Children) -> int:
 
 
 @settings(deadline=None)
-@given(count=st.integers(1, 150), seed=st.integers(0, 10_000), builder=st.sampled_from(sorted(BUILDERS)),
-       leaf_size=st.integers(1, 8), size=st.sampled_from([0.001, 0.1, 3.0]))
+@given(
+    count=st.integers(1, 150),
+    seed=st.integers(0, 10_000),
+    builder=st.sampled_from(sorted(BUILDERS)),
+    leaf_size=st.integers(1, 8),
+    size=st.sampled_from([0.001, 0.1, 3.0]),
+)
 def test_stack_bounds_are_exact(count: int, seed: int, builder: str, leaf_size: int, size: float) -> None:
     triangles = soup(count, size, seed)
     tree = BUILDERS[builder](triangles.min(axis=1), triangles.max(axis=1), leaf_size, 1)

@@ -18,12 +18,15 @@ SCENE = np.random.default_rng(3).uniform(0.05, 2, (64, 96, 3))
 SEEDS = range(16)
 
 
-def renderer(first: int, change: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda mean: mean,
-             spread: float = 0.3) -> Callable[[int, int], Picture]:
+def renderer(
+    first: int, change: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda mean: mean, spread: float = 0.3
+) -> Callable[[int, int], Picture]:
     """Return a renderer of SCENE with exponential errors, correlated along rows of pixels as samplers' errors are."""
+
     def draw(spp: int, seed: int) -> Picture:
         errors = np.random.default_rng([first, seed]).exponential(size=(64, 12, 3)).repeat(8, axis=1) - 1
         return Picture(spp, 0.0, 0.0, (change(SCENE) * (1 + spread * errors / np.sqrt(spp))).astype(np.float32))
+
     return draw
 
 
@@ -52,8 +55,11 @@ def brighter_block(mean: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where((np.arange(64)[:, None, None] // 16 == 2) & (np.arange(96)[:, None] // 16 == 1), 1.03, 1) * mean
 
 
-@pytest.mark.parametrize(("change", "rejected"), [(brighter_block, 3), (lambda mean: mean * (1.02, 1, 1), 24)],
-                         ids=["one block by 3 %", "red by 2 %"])
+@pytest.mark.parametrize(
+    ("change", "rejected"),
+    [(brighter_block, 3), (lambda mean: mean * (1.02, 1, 1), 24)],
+    ids=["one block by 3 %", "red by 2 %"],
+)
 def test_what_differs_is_found(change: Callable[[NDArray[np.float64]], NDArray[np.float64]], rejected: int) -> None:
     told = compared(means(1, change), means(2))
     assert not told["agree"] and told["rejected"] == rejected and told["p"] < 1e-6

@@ -31,12 +31,20 @@ def test_families_without_bias_are_rarely_rejected(seeds: int, steps: int, noise
 @pytest.mark.parametrize("spp", [1, 16])
 def test_one_percent_is_found_and_none_is_not(spp: int) -> None:
     """The mean of 64·3072 pixels of variance 1/2 is known to 0.0016; with 16 samples to 0.0004."""
-    contestants = {"right": sampler(0.5, 0.1), "bright": sampler(0.5, 0.1, gain=1.01),
-                   "dark": sampler(0.5, 0.1, gain=0.99), "also right": sampler(0.1, 0.1, told=1.0)}
+    contestants = {
+        "right": sampler(0.5, 0.1),
+        "bright": sampler(0.5, 0.1, gain=1.01),
+        "dark": sampler(0.5, 0.1, gain=0.99),
+        "also right": sampler(0.1, 0.1, told=1.0),
+    }
     effort = Effort(math.inf, 64, 2, spp=[spp])
     rows = figures(take_turns(contestants, EXACT, effort), EXACT)
     assert {name: row["biased"] for name, row in rows.items()} == {
-        "right": False, "bright": True, "dark": True, "also right": False}
+        "right": False,
+        "bright": True,
+        "dark": True,
+        "also right": False,
+    }
     assert all(row["spp"] == [spp] for row in rows.values())
     error = math.sqrt(0.5 / spp / TRUTH[..., 0].size / 64)
     for z, mean in zip(rows["bright"]["z"], TRUTH.mean((0, 1))):

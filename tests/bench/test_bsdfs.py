@@ -28,9 +28,11 @@ def test_a_new_material_is_tried_with_all_its_numbers_flags_and_words() -> None:
     plain, worded = plain_variants(Glass), worded_variants(Glass)
     assert all(isinstance(material, Glass) for material in plain + worded)
     assert {(glass.weight, glass.thin) for glass in plain if isinstance(glass, Glass)} == {
-        (weight, thin) for weight in (1, 2, 3) for thin in (False, True)}
+        (weight, thin) for weight in (1, 2, 3) for thin in (False, True)
+    }
     assert {(glass.form, glass.thin) for glass in worded if isinstance(glass, Glass)} == {
-        (form, thin) for form in ("smith", "schlick") for thin in (False, True)}
+        (form, thin) for form in ("smith", "schlick") for thin in (False, True)
+    }
 
 
 @pytest.mark.parametrize("roughness, most", [(0.0, 2.0**-7), (0.1, 2.0**-13), (1.0, 2.0**-13)])

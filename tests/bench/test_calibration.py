@@ -14,9 +14,17 @@ from clrt.bench.convergence.reference import Reference
 from .known import EXACT, TRUTH, UNIT, sampler
 
 
-@pytest.mark.parametrize(("noise", "error", "own", "ratio"), [
-    (0.2, 0.04, 0.0, 1.0), (0.3, 0.04, 0.0, 1.5), (0.2, 0.05, 0.01, 1.0),
-    (0.1, 0.02, 0.01, nan), (0.1, 0.0, 0.0, nan), (nan, 0.04, 0.0, nan)])
+@pytest.mark.parametrize(
+    ("noise", "error", "own", "ratio"),
+    [
+        (0.2, 0.04, 0.0, 1.0),
+        (0.3, 0.04, 0.0, 1.5),
+        (0.2, 0.05, 0.01, 1.0),
+        (0.1, 0.02, 0.01, nan),
+        (0.1, 0.0, 0.0, nan),
+        (nan, 0.04, 0.0, nan),
+    ],
+)
 def test_the_references_error_is_none_of_the_pictures(noise: float, error: float, own: float, ratio: float) -> None:
     """The reference's own error is subtracted; an error that does not exceed it gives no ratio."""
     assert noise_ratio(noise, error, own) == pytest.approx(ratio, nan_ok=True)
@@ -24,8 +32,12 @@ def test_the_references_error_is_none_of_the_pictures(noise: float, error: float
 
 def test_what_is_told_is_compared_with_what_is_true() -> None:
     """For normal errors of 9216 values, the true √relMSE is within a few percent of the expected one."""
-    contestants = {"right": sampler(0.5, 0.1, told=1.0), "high": sampler(0.5, 0.1, told=1.4),
-                   "low": sampler(0.5, 0.1, told=0.7), "mute": sampler(0.5, 0.1)}
+    contestants = {
+        "right": sampler(0.5, 0.1, told=1.0),
+        "high": sampler(0.5, 0.1, told=1.4),
+        "low": sampler(0.5, 0.1, told=0.7),
+        "mute": sampler(0.5, 0.1),
+    }
     rng = np.random.default_rng(1)
     noisy = Reference(np.zeros((0, 3)), np.zeros_like(TRUTH), np.zeros_like(TRUTH))
     for _ in range(64):

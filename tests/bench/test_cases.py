@@ -61,7 +61,7 @@ def test_textbook_spheres_are_found_out(device: Device) -> None:
     assert sum(row.wrong for row in rows) > 1000
     assert max(row.figure or 0 for row in rows) > 1e6
     robust = measure_spheres(Subject(device.info.index), quick=True)
-    assert max(row.figure or 0 for row in robust) < 4   # units in the last place
+    assert max(row.figure or 0 for row in robust) < 4  # units in the last place
 
 
 def test_fixed_offsets_are_found_out(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:

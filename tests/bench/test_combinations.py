@@ -53,11 +53,17 @@ def test_pictures_of_random_scenes_obey(device: Device, name: str) -> None:
 def three_lights() -> Scene:
     """Return a sphere on a floor under an emissive sphere, a point light and a constant environment."""
     lamp = Diffuse(emission=(9.0, 9.0, 9.0))
-    return Scene(spheres=[Sphere(), Sphere(center=(0.0, -100.0, 0.0), radius=99.0),
-                          Sphere(center=(2.0, 3.0, 0.0), radius=0.5, material=lamp)],
-                 lights=[PointLight(position=(-2.0, 3.0, 0.0), intensity=(9.0, 9.0, 9.0))],
-                 environment=Environment(color=(0.5, 0.5, 0.5)), camera=Camera(position=(0.0, 1.0, 5.0)),
-                 render=RenderSettings(size=(24, 16), max_depth=3))
+    return Scene(
+        spheres=[
+            Sphere(),
+            Sphere(center=(0.0, -100.0, 0.0), radius=99.0),
+            Sphere(center=(2.0, 3.0, 0.0), radius=0.5, material=lamp),
+        ],
+        lights=[PointLight(position=(-2.0, 3.0, 0.0), intensity=(9.0, 9.0, 9.0))],
+        environment=Environment(color=(0.5, 0.5, 0.5)),
+        camera=Camera(position=(0.0, 1.0, 5.0)),
+        render=RenderSettings(size=(24, 16), max_depth=3),
+    )
 
 
 def pixels(device: Device, side: Side) -> NDArray[np.float64]:
@@ -117,8 +123,9 @@ def test_scenes_have_everything() -> None:
         varied |= {(kind, field.name) for kind, field, value in values if value != field.default}
         textured |= {(kind, field.name) for kind, field, value in values if isinstance(value, Texture)}
         features = features.union(*(each.features() for each in materials(scene)))
-    every = {(kind, field.name): get_type_hints(kind)[field.name]
-             for kind in (*MATERIALS, *LIGHTS) for field in fields(kind)}
+    every = {
+        (kind, field.name): get_type_hints(kind)[field.name] for kind in (*MATERIALS, *LIGHTS) for field in fields(kind)
+    }
     assert every.keys() <= varied
     assert {field for field, hint in every.items() if Texture in get_args(hint)} <= textured
     assert {"COAT_NORMALS", "LAYER_ROWS"} <= features

@@ -128,8 +128,9 @@ def rendered(scene: Scene, steps: int, device: Device) -> tuple[Reference, list[
     return render_reference(scene, steps, device=device.info.index, on_step=heard.append), heard
 
 
-def test_references_are_kept_and_go_on(scene: Scene, device: Device, tmp_path: Path,
-                                       monkeypatch: pytest.MonkeyPatch) -> None:
+def test_references_are_kept_and_go_on(
+    scene: Scene, device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
     two, first = rendered(scene, 2, device)
     again, second = rendered(scene, 2, device)
@@ -140,20 +141,24 @@ def test_references_are_kept_and_go_on(scene: Scene, device: Device, tmp_path: P
     means = [list(renderer.passes(spp=STEP_SPP))[-1].film.mean for renderer in pictures]
     np.testing.assert_allclose(three.pixels, np.mean(means, 0), rtol=1e-6)
     assert rendered(scene, 2, device)[0].steps == 3, "what is there already is not thrown away"
-    for other in (replace(scene, render=replace(scene.render, max_depth=3)), replace(scene, camera=Camera()),
-                  replace(scene, spheres=[replace(scene.spheres[0], radius=0.9), scene.spheres[1]])):
+    for other in (
+        replace(scene, render=replace(scene.render, max_depth=3)),
+        replace(scene, camera=Camera()),
+        replace(scene, spheres=[replace(scene.spheres[0], radius=0.9), scene.spheres[1]]),
+    ):
         assert rendered(other, 2, device)[1] == [0, 1]
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "empty", "others"])
-def test_damaged_references_are_rendered_anew(damage: str, scene: Scene, device: Device, tmp_path: Path,
-                                              monkeypatch: pytest.MonkeyPatch) -> None:
+def test_damaged_references_are_rendered_anew(
+    damage: str, scene: Scene, device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
     whole, _ = rendered(scene, 2, device)
     (file,) = tmp_path.glob(REFERENCES)
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 1
-    file.write_bytes({"cut": content[:len(content) // 2], "changed": content}.get(damage, b""))
+    file.write_bytes({"cut": content[: len(content) // 2], "changed": content}.get(damage, b""))
     if damage == "others":
         np.savez(file, means=np.zeros((9, 3)), total=np.zeros((2, 2, 3)), squares=np.zeros((2, 2, 3)))
     anew, heard = rendered(scene, 2, device)
@@ -176,8 +181,12 @@ def test_renderers_choices_are_taken(scene: Scene, device: Device) -> None:
 
 
 def test_independent_samples_of_a_real_scene_have_slope_minus_one(scene: Scene, device: Device) -> None:
-    result, = measure_convergence([scene], [device.info.index], Effort(seconds=0.2, seeds=4, steps=4),
-                                  choices={"independent": {"sampler": "independent"}})
+    (result,) = measure_convergence(
+        [scene],
+        [device.info.index],
+        Effort(seconds=0.2, seeds=4, steps=4),
+        choices={"independent": {"sampler": "independent"}},
+    )
     row = result["contestants"]["independent"]
     assert (result["scene"], result["size"], result["max_depth"]) == ("ball", (24, 16), 4)
     assert result["reference"]["spp"] == 4 * STEP_SPP and len(row["spp"]) > 3
@@ -195,7 +204,7 @@ main(["bench", "converge", "ball.toml", "--quick", "--time", "0.004", "--peers",
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     written = json.loads((tmp_path / "c.json").read_text())
-    scene, = written["scenes"]
+    (scene,) = written["scenes"]
     assert list(written) == ["quick", "scenes", "calibration"] and set(written["calibration"]) <= set(CHOICES)
     assert {"scene", "size", "max_depth", "reference", "contestants", "missing"} == set(scene)
     assert scene["missing"] == {name: f"not installed (pip install {name})" for name in ("mitsuba", "bpy")}
@@ -203,9 +212,26 @@ main(["bench", "converge", "ball.toml", "--quick", "--time", "0.004", "--peers",
     assert "ball: without mitsuba: not installed" in done.stderr
     assert list(scene["contestants"]) == list(CHOICES)
     for name, row in scene["contestants"].items():
-        assert {"spp", "seconds", "cpu_seconds", "relmse", "last", "msamples", "relmse_seconds", "relmse_cpu_seconds",
-                "ratio", "cpu_ratio", "slope", "mean_ratio", "agrees", "noise_ratio", "z", "p", "biased",
-                "relmse_range"} == set(row)
+        assert {
+            "spp",
+            "seconds",
+            "cpu_seconds",
+            "relmse",
+            "last",
+            "msamples",
+            "relmse_seconds",
+            "relmse_cpu_seconds",
+            "ratio",
+            "cpu_ratio",
+            "slope",
+            "mean_ratio",
+            "agrees",
+            "noise_ratio",
+            "z",
+            "p",
+            "biased",
+            "relmse_range",
+        } == set(row)
         assert all(low <= mean <= high for mean, (low, high) in zip(row["relmse"], row["relmse_range"]))
         assert len(row["spp"]) == len(row["seconds"]) == len(row["relmse"]) == len(row["noise_ratio"])
         assert any(line.startswith(f"  {name}  ") for line in done.stdout.splitlines())
@@ -218,12 +244,29 @@ def test_command_does_what_is_asked(tmp_path: Path) -> None:
     """Sample counts, seeds, size, choices and reference are used; independent samples have the estimated errors, once
     there are enough to estimate how fast these fall."""
     (tmp_path / "ball.toml").write_text(SCENE)
-    asked = ["--choice", "independent", "--choice", "unplanned", "--spp", "32", "--spp", "3", "--seeds", "4",
-             "--size", "32x16", "--reference-spp", "2000", "--quick", "--json", str(tmp_path / "c.json")]
+    asked = [
+        "--choice",
+        "independent",
+        "--choice",
+        "unplanned",
+        "--spp",
+        "32",
+        "--spp",
+        "3",
+        "--seeds",
+        "4",
+        "--size",
+        "32x16",
+        "--reference-spp",
+        "2000",
+        "--quick",
+        "--json",
+        str(tmp_path / "c.json"),
+    ]
     done = CliRunner().invoke(converge_command, [str(tmp_path / "ball.toml"), *asked])
     assert done.exit_code == 0, done.output
     written = json.loads((tmp_path / "c.json").read_text())
-    scene, = written["scenes"]
+    (scene,) = written["scenes"]
     assert scene["size"] == [32, 16] and scene["reference"]["spp"] == 2000
     rows = scene["contestants"]
     assert list(rows) == list(written["calibration"]) == ["clrt, independent", "clrt, unplanned"]
@@ -238,8 +281,25 @@ def test_command_does_what_is_asked(tmp_path: Path) -> None:
 def test_each_integrator_has_a_reference_of_its_own(tmp_path: Path) -> None:
     """Path depths differ, so the images differ, and each agrees with its own reference."""
     (tmp_path / "ball.toml").write_text(SCENE)
-    asked = ["--integrator", "path", "--integrator", "direct", "--choice", "clrt", "--spp", "64", "--seeds", "3",
-             "--reference-spp", "512", "--quick", "--json", str(tmp_path / "c.json"), "--plot", str(tmp_path / "c.svg")]
+    asked = [
+        "--integrator",
+        "path",
+        "--integrator",
+        "direct",
+        "--choice",
+        "clrt",
+        "--spp",
+        "64",
+        "--seeds",
+        "3",
+        "--reference-spp",
+        "512",
+        "--quick",
+        "--json",
+        str(tmp_path / "c.json"),
+        "--plot",
+        str(tmp_path / "c.svg"),
+    ]
     done = CliRunner().invoke(converge_command, [str(tmp_path / "ball.toml"), *asked])
     assert done.exit_code == 0, done.output
     scenes = json.loads((tmp_path / "c.json").read_text())["scenes"]
@@ -253,15 +313,29 @@ def test_a_given_reference_is_used(tmp_path: Path) -> None:
     (tmp_path / "ball.toml").write_text(SCENE)
     truth = np.random.default_rng(5).uniform(0.2, 1, (16, 24, 3)).astype(np.float32)
     clrt.Image(truth).save(tmp_path / "ref.exr")
-    asked = ["--choice", "clrt", "--spp", "4", "--seeds", "2", "--json", str(tmp_path / "c.json"), "--plot",
-             str(tmp_path / "c.svg"), "--reference", str(tmp_path / "ref.exr")]
+    asked = [
+        "--choice",
+        "clrt",
+        "--spp",
+        "4",
+        "--seeds",
+        "2",
+        "--json",
+        str(tmp_path / "c.json"),
+        "--plot",
+        str(tmp_path / "c.svg"),
+        "--reference",
+        str(tmp_path / "ref.exr"),
+    ]
     done = CliRunner().invoke(converge_command, [str(tmp_path / "ball.toml"), *asked])
     assert done.exit_code == 0, done.output
     assert "reference given" in done.output and "step" not in done.output
     row = json.loads((tmp_path / "c.json").read_text())["scenes"][0]["contestants"]["clrt"]
     pictures = [clrt.render(tmp_path / "ball.toml", spp=4, seed=seed).pixels for seed in (0, 1)]
-    errors = [float(np.mean((picture - truth.astype(np.float64))**2 / (truth.astype(np.float64)**2 + 0.01)))
-              for picture in pictures]
+    errors = [
+        float(np.mean((picture - truth.astype(np.float64)) ** 2 / (truth.astype(np.float64) ** 2 + 0.01)))
+        for picture in pictures
+    ]
     assert row["relmse"] == [pytest.approx(np.mean(errors), rel=1e-5)]
     for wrong, words in [(["--size", "8x8"], "is 24x16, the image 8x8"), (["--reference-spp", "9"], "leave out")]:
         failed = CliRunner().invoke(converge_command, [str(tmp_path / "ball.toml"), *asked, *wrong])
@@ -272,11 +346,19 @@ def test_command_knows_all_choices() -> None:
     assert [f"clrt, {name}".removesuffix(", clrt") for name in NAMES] == [*CHOICES, *MORE_CHOICES]
 
 
-@pytest.mark.parametrize(("arguments", "code", "words"), [
-    (["no.toml"], 3, "no.toml"), (["no.toml", "--plot", "a/b.png"], 6, "a/b.png"), ([], 2, "SCENE"),
-    (["no.toml", "--device", "nonesuch"], 4, "nonesuch"), (["no.toml", "--time", "0"], 2, "--time"),
-    (["no.toml", "--choice", "lanes"], 2, "'lanes 1'")])
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["no.toml"], 3, "no.toml"),
+        (["no.toml", "--plot", "a/b.png"], 6, "a/b.png"),
+        ([], 2, "SCENE"),
+        (["no.toml", "--device", "nonesuch"], 4, "nonesuch"),
+        (["no.toml", "--time", "0"], 2, "--time"),
+        (["no.toml", "--choice", "lanes"], 2, "'lanes 1'"),
+    ],
+)
 def test_mistakes_end_in_one_message(arguments: list[str], code: int, words: str, tmp_path: Path) -> None:
-    done: Any = subprocess.run([sys.executable, "-m", "clrt", "bench", "converge", *arguments], cwd=tmp_path,
-                               capture_output=True, text=True)
+    done: Any = subprocess.run(
+        [sys.executable, "-m", "clrt", "bench", "converge", *arguments], cwd=tmp_path, capture_output=True, text=True
+    )
     assert done.returncode == code and words in done.stderr and "Traceback" not in done.stderr

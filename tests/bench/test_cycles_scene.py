@@ -46,17 +46,26 @@ def test_spheres_are_triangles_seen_from_outside() -> None:
     assert volume == pytest.approx(4 / 3 * np.pi * 0.5**3, rel=1e-3)
 
 
-@pytest.mark.parametrize(("scene", "words"), [
-    (ball(MetallicRoughness(metallic=0.5)), "the ball: .*fully metallic"),
-    (ball(MetallicRoughness(metallic=1.0, smith="separable")), "the ball: .*height_correlated"),
-    (Scene(lights=[SpotLight(position=(0, 0, 0), direction=(0, 0, 1), intensity=(1, 1, 1))], name="room"),
-     "room: ranges and spot lights"),
-    (Scene(lights=[PointLight(position=(0, 0, 0), intensity=(1, 1, 1), range=2)], name="room"), "room: ranges and"),
-    (replace(ball(MATERIALS[0]()), camera=Camera(aperture_radius=0.1)), "room: .*only pinhole cameras"),
-    (replace(ball(MATERIALS[0]()), render=RenderSettings(max_depth=1)), "room: .*max_depth of 2"),
-    (replace(ball(MATERIALS[0]()), render=RenderSettings(back_face_culling="all")), "room: back_face_culling is not"),
-    (replace(ball(MATERIALS[0]()), render=RenderSettings(clamp_indirect=1.0)), "room: clamps .*out clamp_indirect"),
-    (replace(ball(MATERIALS[0]()), render=RenderSettings(filter="tent")), 'room: .*filter = "box"')])
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (ball(MetallicRoughness(metallic=0.5)), "the ball: .*fully metallic"),
+        (ball(MetallicRoughness(metallic=1.0, smith="separable")), "the ball: .*height_correlated"),
+        (
+            Scene(lights=[SpotLight(position=(0, 0, 0), direction=(0, 0, 1), intensity=(1, 1, 1))], name="room"),
+            "room: ranges and spot lights",
+        ),
+        (Scene(lights=[PointLight(position=(0, 0, 0), intensity=(1, 1, 1), range=2)], name="room"), "room: ranges and"),
+        (replace(ball(MATERIALS[0]()), camera=Camera(aperture_radius=0.1)), "room: .*only pinhole cameras"),
+        (replace(ball(MATERIALS[0]()), render=RenderSettings(max_depth=1)), "room: .*max_depth of 2"),
+        (
+            replace(ball(MATERIALS[0]()), render=RenderSettings(back_face_culling="all")),
+            "room: back_face_culling is not",
+        ),
+        (replace(ball(MATERIALS[0]()), render=RenderSettings(clamp_indirect=1.0)), "room: clamps .*out clamp_indirect"),
+        (replace(ball(MATERIALS[0]()), render=RenderSettings(filter="tent")), 'room: .*filter = "box"'),
+    ],
+)
 def test_what_has_no_counterpart_is_refused_by_name(scene: Scene, words: str) -> None:
     with pytest.raises(UsageError, match=words):
         check_scene(scene)

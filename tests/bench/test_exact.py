@@ -64,7 +64,7 @@ def test_answers_are_not_wrong_until_they_are_changed(device: Device) -> None:
         np.testing.assert_array_equal(bounds.wrong(rays, changed)[hit], True)
     steep = hit & (bounds.high < bounds.low + 2e-4)
     assert steep.sum() > 200 and bounds.wrong(rays, farther)[steep].all()
-    missed = (bounds.primitive == -1)
+    missed = bounds.primitive == -1
     assert missed.sum() > 100 and bounds.wrong(rays, invented)[missed].all()
 
 

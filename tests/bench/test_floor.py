@@ -94,7 +94,9 @@ def test_table_names_the_judges_that_are_missing(monkeypatch: pytest.MonkeyPatch
         monkeypatch.setitem(sys.modules, package, None)
     found, missing = judges()
     assert [*found] == ["clrt"] and missing == {
-        "mitsuba": "not installed (pip install mitsuba)", "bpy": "not installed (pip install bpy)"}
+        "mitsuba": "not installed (pip install mitsuba)",
+        "bpy": "not installed (pip install bpy)",
+    }
     rows = list(measure_floor(found, 4, 2, ["sun above"]))
     assert [row["material"] for row in rows] == [*MATERIALS] * len(VIEWS)
     assert all(set(row["values"]) == {*MODELS, "clrt"} for row in rows)

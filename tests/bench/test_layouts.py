@@ -28,8 +28,12 @@ def test_all_layouts_answer_alike(device: Device, builder: str | None) -> None:
         for row in rows.values():
             assert row["hits"] == 1 if kind in ("primary", "bounce") else 0 < row["hits"] <= 1
     for name, tree in result["trees"].items():
-        query = clrt.RayQuery(*closed_room(*BALL), device=device.info.index, layout=tree["layout"],
-                              builder=builder if name not in TREELESS else None)
+        query = clrt.RayQuery(
+            *closed_room(*BALL),
+            device=device.info.index,
+            layout=tree["layout"],
+            builder=builder if name not in TREELESS else None,
+        )
         assert tree["bytes_per_triangle"] * 5132 == pytest.approx(query.tree.bytes)
         assert (tree["builder"], tree["sah_cost"]) == (query.tree.builder, query.tree.sah_cost)
 

@@ -70,10 +70,14 @@ def test_what_others_stand_in_for_is_left_out(tmp_path: Path) -> None:
     assert 0.5 < judged.row["judged"] < 1 and judged.row["blocks_rejected"] == 0
 
 
-@pytest.mark.parametrize(("more", "missing"), [
-    (BALL.format('<bsdf type="hair"/>').replace("sphere", "torus"), ["shape torus"]),
-    ('<emitter type="spot"/>' + BALL.format('<bsdf type="hair"/>'), ["bsdf hair", "emitter spot"])],
-    ids=["shape", "both"])
+@pytest.mark.parametrize(
+    ("more", "missing"),
+    [
+        (BALL.format('<bsdf type="hair"/>').replace("sphere", "torus"), ["shape torus"]),
+        ('<emitter type="spot"/>' + BALL.format('<bsdf type="hair"/>'), ["bsdf hair", "emitter spot"]),
+    ],
+    ids=["shape", "both"],
+)
 def test_what_cannot_be_expressed_is_listed(tmp_path: Path, more: str, missing: list[str]) -> None:
     (judged,) = judge(cases(checkout(tmp_path, np.ones((SIZE, SIZE, 3)), more)), samples(1))
     assert judged.row["result"] == "not expressible" and sorted(judged.row["missing"]) == sorted(missing)
@@ -93,8 +97,13 @@ def test_both_tests_reject_as_often_as_they_should() -> None:
     """Mitsuba's rule rejects none of 200 images with the true mean, and the block test about 1 in 1000 families."""
     rng = np.random.default_rng(7)
     mean = np.random.default_rng(1).uniform(0.2, 2, (16, 16, 3))
-    told = [(pixel_test(64 * 16, pictures.mean(0).reshape(-1, 3), mean.reshape(-1, 3), mean.reshape(-1, 3)**2),
-             block_test(pictures, mean, mean**2)) for pictures in (noisy(mean, 64, 16, rng) for _ in range(200))]
+    told = [
+        (
+            pixel_test(64 * 16, pictures.mean(0).reshape(-1, 3), mean.reshape(-1, 3), mean.reshape(-1, 3) ** 2),
+            block_test(pictures, mean, mean**2),
+        )
+        for pictures in (noisy(mean, 64, 16, rng) for _ in range(200))
+    ]
     assert all(pixels["passes"] for pixels, _ in told)
     assert sum(blocks["blocks_rejected"] for _, blocks in told) <= 3
 
@@ -106,7 +115,7 @@ def test_blocks_find_what_pixels_hide(bias: float) -> None:
     wrong = mean.copy()
     wrong[:8, :8] *= bias
     pictures = noisy(wrong, 4, 16, np.random.default_rng(2))
-    assert pixel_test(64, pictures.mean(0).reshape(-1, 3), mean.reshape(-1, 3), mean.reshape(-1, 3)**2)["passes"]
+    assert pixel_test(64, pictures.mean(0).reshape(-1, 3), mean.reshape(-1, 3), mean.reshape(-1, 3) ** 2)["passes"]
     assert block_test(pictures, mean, mean**2)["blocks_rejected"] == 1
 
 
@@ -161,8 +170,18 @@ def test_mitsuba_reads_the_same_scene(tmp_path: Path) -> None:
 def test_the_command_fails_where_a_scene_does(tmp_path: Path, change: float, code: int) -> None:
     """The failure is also in the printed table, the figures, and an image."""
     folder = checkout(tmp_path / "data", np.tile(RADIANCE * change, (SIZE, SIZE, 1)))
-    done = CliRunner().invoke(mitsuba_data_command, [
-        str(folder), "--samples", str(samples(16)), "--json", str(tmp_path / "told.json"), "--pictures", str(tmp_path)])
+    done = CliRunner().invoke(
+        mitsuba_data_command,
+        [
+            str(folder),
+            "--samples",
+            str(samples(16)),
+            "--json",
+            str(tmp_path / "told.json"),
+            "--pictures",
+            str(tmp_path),
+        ],
+    )
     (row,) = json.loads((tmp_path / "told.json").read_text())["scenes"]
     assert (done.exit_code, row["result"]) == (code, "failed" if code else "passed"), done.output
     assert ["wall/test_wall_path", row["result"]] in [line.split()[:2] for line in done.output.splitlines()]

@@ -33,10 +33,22 @@ RNG = np.random.default_rng(5)
 GREY = Picture(np.full((1, 1, 4), 128, np.uint8), "grey")
 PICTURE = Picture(np.array([[[0, 51, 102, 255], [255, 153, 204, 0]]], np.uint8))
 #: The plugin of `MetallicRoughness()`.
-PLASTIC = {"type": "gltf", "color": {"type": "rgb", "value": [0.8] * 3}, "metallic": 0, "roughness": 0.5,
-           "f0": {"type": "rgb", "value": [pytest.approx(0.04)] * 3}, "specular": 1, "transmission": 0, "clearcoat": 0,
-           "sheen_color": {"type": "rgb", "value": [0, 0, 0]}, "smith": "height_correlated", "coupling": "albedo",
-           "multiple": False, "transmits": False, "layered": False}
+PLASTIC = {
+    "type": "gltf",
+    "color": {"type": "rgb", "value": [0.8] * 3},
+    "metallic": 0,
+    "roughness": 0.5,
+    "f0": {"type": "rgb", "value": [pytest.approx(0.04)] * 3},
+    "specular": 1,
+    "transmission": 0,
+    "clearcoat": 0,
+    "sheen_color": {"type": "rgb", "value": [0, 0, 0]},
+    "smith": "height_correlated",
+    "coupling": "albedo",
+    "multiple": False,
+    "transmits": False,
+    "layered": False,
+}
 
 
 def ball(material: Material) -> Scene:
@@ -73,8 +85,12 @@ def test_lenses_and_parallel_rays_are_told() -> None:
     wide = replace(ball(Diffuse()), camera=plan, render=RenderSettings(size=(80, 40)))
     sensor = mitsuba_scene(wide)["sensor"]
     assert sensor["type"] == "orthographic"
-    np.testing.assert_allclose(sensor["to_world"] @ [-1, 0.5, 0, 1], [3, 5, -1.5, 1], atol=1e-12,
-                               err_msg="of -1 to 1 in its x, which is the picture's left")
+    np.testing.assert_allclose(
+        sensor["to_world"] @ [-1, 0.5, 0, 1],
+        [3, 5, -1.5, 1],
+        atol=1e-12,
+        err_msg="of -1 to 1 in its x, which is the picture's left",
+    )
     with pytest.raises(UsageError, match="no equirectangular camera"):
         mitsuba_scene(replace(wide, camera=Camera(projection="equirectangular")))
 
@@ -88,28 +104,43 @@ def test_depth_counts_edges_and_direct_light_is_two_of_them() -> None:
 def test_materials_are_told_by_what_they_reflect() -> None:
     assert bsdf(Diffuse(color=(0.1, 0.2, 0.3)))["reflectance"] == {"type": "rgb", "value": [0.1, 0.2, 0.3]}
     assert bsdf(Mirror(color=(0.5, 0.7, 0.9))) == {
-        "type": "conductor", "material": "none", "specular_reflectance": {"type": "rgb", "value": [0.5, 0.7, 0.9]}}
+        "type": "conductor",
+        "material": "none",
+        "specular_reflectance": {"type": "rgb", "value": [0.5, 0.7, 0.9]},
+    }
     gold = bsdf(MetallicRoughness(preset="gold", roughness=0.3, smith="separable"))
     assert (gold["type"], gold["metallic"], gold["base_color"]["value"]) == ("principled", 1, [1.0, 0.71, 0.29])
     assert gold["roughness"] == pytest.approx(0.3), "principled squares it, too"
     assert mitsuba_scene(ball(Dielectric(ior=1.3, color=(0.9, 0.8, 0.7))))["sphere0"]["bsdf"] == {
-        "type": "dielectric", "int_ior": 1.3, "ext_ior": 1.0,
-        "specular_transmittance": {"type": "rgb", "value": [0.9, 0.8, 0.7]}}, "not two-sided"
+        "type": "dielectric",
+        "int_ior": 1.3,
+        "ext_ior": 1.0,
+        "specular_transmittance": {"type": "rgb", "value": [0.9, 0.8, 0.7]},
+    }, "not two-sided"
 
 
-@pytest.mark.parametrize(("material", "words"), [
-    (MetallicRoughness(clearcoat=0.5, roughness=Texture(picture=GREY)), "the texture grey"),
-    (MetallicRoughness(clearcoat=0.5, normal_map=Texture(picture=GREY)), "a clearcoat with a normal map"),
-    (Dielectric(roughness=Texture(picture=GREY)), "the texture grey"), (Diffuse(one_sided=True), "one-sided")])
+@pytest.mark.parametrize(
+    ("material", "words"),
+    [
+        (MetallicRoughness(clearcoat=0.5, roughness=Texture(picture=GREY)), "the texture grey"),
+        (MetallicRoughness(clearcoat=0.5, normal_map=Texture(picture=GREY)), "a clearcoat with a normal map"),
+        (Dielectric(roughness=Texture(picture=GREY)), "the texture grey"),
+        (Diffuse(one_sided=True), "one-sided"),
+    ],
+)
 def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: str) -> None:
     with pytest.raises(UsageError, match=f"the ball: Mitsuba does not support .*{words}"):
         mitsuba_scene(ball(material))
 
 
-@pytest.mark.parametrize(("scene", "words"), [
-    (replace(ball(Diffuse()), render=RenderSettings(back_face_culling="camera")), "leave out back_face_culling"),
-    (replace(ball(Diffuse()), render=RenderSettings(clamp_direct=1.0)), "leave out clamp_direct"),
-    (ball(Diffuse(emission=(1, 1, 1), double_sided=True)), "leave out double_sided")])
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (replace(ball(Diffuse()), render=RenderSettings(back_face_culling="camera")), "leave out back_face_culling"),
+        (replace(ball(Diffuse()), render=RenderSettings(clamp_direct=1.0)), "leave out clamp_direct"),
+        (ball(Diffuse(emission=(1, 1, 1), double_sided=True)), "leave out double_sided"),
+    ],
+)
 def test_settings_without_a_counterpart_are_refused(scene: Scene, words: str) -> None:
     with pytest.raises(UsageError, match=words):
         mitsuba_scene(scene)
@@ -118,21 +149,33 @@ def test_settings_without_a_counterpart_are_refused(scene: Scene, words: str) ->
 def test_other_gloss_is_a_plugin_of_our_own() -> None:
     """The plugin gets all parameters of the formula in docs/scene-format.md."""
     plastic = bsdf(MetallicRoughness(preset="plastic_high", color=(0.1, 0.2, 0.3), roughness=0.4))
-    assert plastic == PLASTIC | {"color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "roughness": 0.4,
-                                 "f0": {"type": "rgb", "value": [0.05, 0.05, 0.05]}}
+    assert plastic == PLASTIC | {
+        "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]},
+        "roughness": 0.4,
+        "f0": {"type": "rgb", "value": [0.05, 0.05, 0.05]},
+    }
     pane = MetallicRoughness(ior=3, specular=0.5, specular_color=(8, 2, 0), transmission=0.25)
     tinted = mitsuba_scene(ball(pane))["sphere0"]["bsdf"]
-    assert tinted == PLASTIC | {"f0": {"type": "rgb", "value": [1, 0.5, 0]}, "specular": 0.5, "transmission": 0.25,
-                                "transmits": True, "multiple": True}
+    assert tinted == PLASTIC | {
+        "f0": {"type": "rgb", "value": [1, 0.5, 0]},
+        "specular": 0.5,
+        "transmission": 0.25,
+        "transmits": True,
+        "multiple": True,
+    }
     tint = Texture(picture=PICTURE, factor=(1, 2, 4))
     map_of_f0 = bsdf(MetallicRoughness(ior=3, specular_color=tint))["f0"]
     white = bsdf(Diffuse(color=tint))["reflectance"]
     np.testing.assert_allclose(map_of_f0["bitmap"], 0.25 * white["bitmap"], rtol=1e-6)
 
 
-@pytest.mark.parametrize(("material", "kind"), [
-    (Dielectric(roughness=0.7, multiple_scattering=False), "roughdielectric"),
-    (Conductor(preset="gold", roughness=0.7), "roughconductor")])
+@pytest.mark.parametrize(
+    ("material", "kind"),
+    [
+        (Dielectric(roughness=0.7, multiple_scattering=False), "roughdielectric"),
+        (Conductor(preset="gold", roughness=0.7), "roughconductor"),
+    ],
+)
 def test_rough_glass_and_metal_have_the_height_correlated_smith_term(material: Material, kind: str) -> None:
     plugin = mitsuba_scene(ball(material))["sphere0"]["bsdf"]
     plugin = plugin["front"] if plugin["type"] == "twosided" else plugin
@@ -142,35 +185,61 @@ def test_rough_glass_and_metal_have_the_height_correlated_smith_term(material: M
 
 def test_layers_are_a_plugin_of_our_own() -> None:
     velvet = bsdf(MetallicRoughness(color=(0.1, 0.2, 0.3), roughness=0.4, clearcoat=0.5, sheen_color=(0.6, 0.7, 0.8)))
-    assert velvet == PLASTIC | {"color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "roughness": 0.4,
-                                "sheen_color": {"type": "rgb", "value": [0.6, 0.7, 0.8]}, "clearcoat": 0.5,
-                                "clearcoat_roughness": 0, "sheen_roughness": 0, "layered": True}
+    assert velvet == PLASTIC | {
+        "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]},
+        "roughness": 0.4,
+        "sheen_color": {"type": "rgb", "value": [0.6, 0.7, 0.8]},
+        "clearcoat": 0.5,
+        "clearcoat_roughness": 0,
+        "sheen_roughness": 0,
+        "layered": True,
+    }
 
 
 def test_phong_models_are_told_apart() -> None:
     for kind, half_vector in ((Phong, False), (BlinnPhong, True)):
         told = bsdf(kind(color=(0.1, 0.2, 0.3), specular=(0.4, 0.5, 0.6), shininess=20))
-        assert told == {"type": "phong", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "shininess": 20,
-                        "specular": {"type": "rgb", "value": [0.4, 0.5, 0.6]}, "half_vector": half_vector}
+        assert told == {
+            "type": "phong",
+            "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]},
+            "shininess": 20,
+            "specular": {"type": "rgb", "value": [0.4, 0.5, 0.6]},
+            "half_vector": half_vector,
+        }
 
 
 def test_glass_that_mitsuba_lacks_is_a_plugin_of_our_own() -> None:
     """Multiple scattering is added to single scattering; rough or colored sheets are one plugin."""
     told = mitsuba_scene(ball(Dielectric(ior=1.3, roughness=0.7, color=(1, 0.5, 0.25))))["sphere0"]["bsdf"]
     single = replace(Dielectric(ior=1.3, roughness=0.7, color=(1, 0.5, 0.25)), multiple_scattering=False)
-    assert told == {"type": "all_bounces", "ior": 1.3, "alpha": pytest.approx(0.49), "bsdf": mitsuba_scene(
-        ball(single))["sphere0"]["bsdf"], "color": {"type": "rgb", "value": [1, 0.5, 0.25]}}
-    for pane, alpha in ((Dielectric(thin=True, color=(1, 0.5, 0.25)), 0),
-                        (Dielectric(thin=True, roughness=0.5, color=(1, 0.5, 0.25)), 0.25)):
+    assert told == {
+        "type": "all_bounces",
+        "ior": 1.3,
+        "alpha": pytest.approx(0.49),
+        "bsdf": mitsuba_scene(ball(single))["sphere0"]["bsdf"],
+        "color": {"type": "rgb", "value": [1, 0.5, 0.25]},
+    }
+    for pane, alpha in (
+        (Dielectric(thin=True, color=(1, 0.5, 0.25)), 0),
+        (Dielectric(thin=True, roughness=0.5, color=(1, 0.5, 0.25)), 0.25),
+    ):
         assert mitsuba_scene(ball(pane))["sphere0"]["bsdf"] == {
-            "type": "sheet", "ior": 1.5, "alpha": alpha, "multiple": alpha > 0,
-            "color": {"type": "rgb", "value": [1, 0.5, 0.25]}}, "not two-sided"
+            "type": "sheet",
+            "ior": 1.5,
+            "alpha": alpha,
+            "multiple": alpha > 0,
+            "color": {"type": "rgb", "value": [1, 0.5, 0.25]},
+        }, "not two-sided"
     assert mitsuba_scene(ball(Dielectric(thin=True)))["sphere0"]["bsdf"]["type"] == "thindielectric"
 
 
 def test_vertex_colors_multiply_the_color() -> None:
-    mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), colors=np.full((3, 4), 0.5, np.float32),
-                material=MetallicRoughness(color=(1, 0.5, 0.25)))
+    mesh = Mesh(
+        np.eye(3, dtype=np.float32),
+        np.array([[0, 1, 2]], np.int32),
+        colors=np.full((3, 4), 0.5, np.float32),
+        material=MetallicRoughness(color=(1, 0.5, 0.25)),
+    )
     told = mitsuba_scene(Scene(meshes=[mesh]))["mesh0"]
     assert told["bsdf"]["front"]["color"] == {"type": "mesh_attribute", "name": "vertex_color"}
     np.testing.assert_allclose(told["colors"], [[0.5, 0.25, 0.125]] * 3)
@@ -214,13 +283,12 @@ def test_glass_that_absorbs_has_a_medium_inside() -> None:
 
 def test_spots_throw_their_falloff() -> None:
     """At the angle whose cosine is halfway between those of the cones, f is ½ and the intensity f²."""
-    light = SpotLight(position=(0, 3, 0), direction=(0, -2, 0), intensity=(1, 2, 3), inner_degrees=20,
-                      outer_degrees=60)
+    light = SpotLight(position=(0, 3, 0), direction=(0, -2, 0), intensity=(1, 2, 3), inner_degrees=20, outer_degrees=60)
     told = mitsuba_scene(Scene(lights=[light]))["light0"]
     np.testing.assert_allclose(told["to_world"][:3, [2, 3]], [[0, 0], [-1, 3], [0, 0]], atol=1e-12)
     assert (told["cutoff_angle"], told["beam_width"]) == (60, 60)
     half = (np.cos(np.radians(20)) + 0.5) / 2
-    across = np.tan(np.arccos(half)) / np.tan(np.radians(60))     # in half widths of the texture
+    across = np.tan(np.arccos(half)) / np.tan(np.radians(60))  # in half widths of the texture
     row = told["texture"]["bitmap"][len(told["texture"]["bitmap"]) // 2, :, 0]
     middles = (np.arange(len(row)) + 0.5) / len(row) * 2 - 1
     assert np.interp(across, middles, row) == pytest.approx(0.25, abs=1e-3)
@@ -244,16 +312,24 @@ def test_every_material_is_converted_or_refused() -> None:
 
 def test_lights_keep_their_units() -> None:
     lamp = Diffuse(color=(0, 0, 0), emission=(17, 12, 4))
-    scene = Scene(meshes=[Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), lamp)], spheres=[Sphere()],
-                  lights=[PointLight(position=(1, 2, 3), intensity=(4, 5, 6)),
-                          DirectionalLight(direction=(0, -1, 0), irradiance=(3, 2, 1))])
+    scene = Scene(
+        meshes=[Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), lamp)],
+        spheres=[Sphere()],
+        lights=[
+            PointLight(position=(1, 2, 3), intensity=(4, 5, 6)),
+            DirectionalLight(direction=(0, -1, 0), irradiance=(3, 2, 1)),
+        ],
+    )
     told = mitsuba_scene(scene)
     assert told["mesh0"]["emitter"] == {"type": "area", "radiance": {"type": "rgb", "value": [17, 12, 4]}}
     assert told["mesh0"]["vertices"] is scene.meshes[0].vertices and told["mesh0"]["normals"] is None
     assert "emitter" not in told["sphere0"]
     assert told["light0"] == {"type": "point", "position": [1, 2, 3], "intensity": {"type": "rgb", "value": [4, 5, 6]}}
-    assert told["light1"] == {"type": "directional", "direction": [0, -1, 0],
-                              "irradiance": {"type": "rgb", "value": [3, 2, 1]}}
+    assert told["light1"] == {
+        "type": "directional",
+        "direction": [0, -1, 0],
+        "irradiance": {"type": "rgb", "value": [3, 2, 1]},
+    }
     assert "sky" not in told, "a black sky would be sampled as often as the others"
 
 
@@ -267,7 +343,7 @@ def test_suns_are_far_discs(direction: tuple[float, float, float]) -> None:
     np.testing.assert_allclose(middle / np.linalg.norm(middle), -np.array(direction) / np.linalg.norm(direction))
     np.testing.assert_allclose(np.linalg.norm(place[:3, :2], axis=0) / np.linalg.norm(middle), np.tan(half))
     np.testing.assert_allclose(place[:3, 2], np.array(direction) / np.linalg.norm(direction), atol=1e-12)
-    np.testing.assert_allclose(told["emitter"]["radiance"]["value"], np.array([3, 2, 1]) / (np.pi * np.sin(half)**2))
+    np.testing.assert_allclose(told["emitter"]["radiance"]["value"], np.array([3, 2, 1]) / (np.pi * np.sin(half) ** 2))
     with pytest.raises(UsageError, match="angle_degrees = 120"):
         mitsuba_scene(Scene(lights=[replace(sun, angle_degrees=120.0)]))
 

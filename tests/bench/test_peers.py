@@ -29,8 +29,13 @@ RNG = np.random.default_rng(17)
 BALL = bumpy_ball(3)
 #: Number of rays that is no multiple of the packet, chunk and block sizes.
 COUNT = 4096 + 128 + 13
-MODULES = {"embreex": "embreex", "trimesh + embreex": "embreex", "trimesh + rtree": "rtree", "open3d": "open3d",
-           "warp": "warp"}
+MODULES = {
+    "embreex": "embreex",
+    "trimesh + embreex": "embreex",
+    "trimesh + rtree": "rtree",
+    "open3d": "open3d",
+    "warp": "warp",
+}
 
 
 def rays(count: int = COUNT) -> Rays:
@@ -111,12 +116,21 @@ def test_race_takes_turns_and_medians() -> None:
             order.append(name)
             value = seconds.pop()
             return value, 2 * value
+
         return Contestant(run, 1000 if name == "a" else 500, 0.25)
 
     result = race({"a": runner("a", [9.0, 1.0, 2.0]), "b": runner("b", [1.5, 0.5, 100.0])}, rounds=3)
     assert order == ["a", "b"] * 3
-    assert result["a"] == {"rays": 1000, "seconds": 2, "cpu_seconds": 4, "mrays": pytest.approx(0.0005), "ratio": 1,
-                           "cpu_ratio": 1, "agrees": 0.25, "rounds": [(2, 4), (1, 2), (9, 18)]}
+    assert result["a"] == {
+        "rays": 1000,
+        "seconds": 2,
+        "cpu_seconds": 4,
+        "mrays": pytest.approx(0.0005),
+        "ratio": 1,
+        "cpu_ratio": 1,
+        "agrees": 0.25,
+        "rounds": [(2, 4), (1, 2), (9, 18)],
+    }
     assert result["b"]["ratio"] == pytest.approx((1000 / 2) / (500 / 1.5))
 
 

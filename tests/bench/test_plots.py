@@ -22,11 +22,19 @@ def test_convergence_is_legible(monkeypatch: pytest.MonkeyPatch, scenes: int, lo
 
     drawn: list[Figure] = []
     monkeypatch.setattr(plots, "write_figure", lambda path, figure: drawn.append(figure))
-    row = {"seconds": [0.06, longest], "spp": [1, round(longest / 0.06)], "relmse": [0.1, 0.006 / longest],
-           "relmse_range": [(0.09, 0.11), (0.005 / longest, 0.007 / longest)]}
+    row = {
+        "seconds": [0.06, longest],
+        "spp": [1, round(longest / 0.06)],
+        "relmse": [0.1, 0.006 / longest],
+        "relmse_range": [(0.09, 0.11), (0.005 / longest, 0.007 / longest)],
+    }
     names = ["clrt", "clrt, stratified", "clrt, independent", "clrt, lanes 1", "clrt, bvh2"]
-    result: dict[str, Any] = {"scene": "cornell", "size": (256, 256), "contestants": dict.fromkeys(names, row),
-                              "reference": {"relmse": 3.5e-5}}
+    result: dict[str, Any] = {
+        "scene": "cornell",
+        "size": (256, 256),
+        "contestants": dict.fromkeys(names, row),
+        "reference": {"relmse": 3.5e-5},
+    }
     plots.plot_convergence(Path("a.png"), [result] * scenes, ["device 0: pthread (Portable Computing Language)"])
     (figure,) = drawn
     FigureCanvasAgg(figure)

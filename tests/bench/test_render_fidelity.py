@@ -46,15 +46,36 @@ def suite(folder: Path, skybox: bool = False) -> Path:
     for place in ("test", "environments", "models"):
         (generator / place).mkdir(parents=True)
     gltf = Gltf()
-    gltf.document["materials"] = [{"name": "glow", "emissiveFactor": COLOR,
-                                   "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 1}}]
-    gltf.mesh(attributes={"POSITION": gltf.accessor(WALL)}, material=0,
-              indices=gltf.accessor(np.array([0, 1, 2, 0, 2, 3]), "<u2"))
+    gltf.document["materials"] = [
+        {
+            "name": "glow",
+            "emissiveFactor": COLOR,
+            "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 1},
+        }
+    ]
+    gltf.mesh(
+        attributes={"POSITION": gltf.accessor(WALL)},
+        material=0,
+        indices=gltf.accessor(np.array([0, 1, 2, 0, 2, 3]), "<u2"),
+    )
     gltf.write(generator / "models" / "wall.glb")
     Image(np.ones((8, 16, 3), np.float32)).save(generator / "environments" / "sky.hdr")
-    (generator / "test" / "config.json").write_text(json.dumps({"scenarios": [{
-        "name": "wall", "model": "../../../models/wall.glb", "lighting": "../../../environments/sky.hdr",
-        "renderSkybox": skybox, "orbit": {"radius": 4}, "dimensions": {"width": 64, "height": 64}}]}))
+    (generator / "test" / "config.json").write_text(
+        json.dumps(
+            {
+                "scenarios": [
+                    {
+                        "name": "wall",
+                        "model": "../../../models/wall.glb",
+                        "lighting": "../../../environments/sky.hdr",
+                        "renderSkybox": skybox,
+                        "orbit": {"radius": 4},
+                        "dimensions": {"width": 64, "height": 64},
+                    }
+                ]
+            }
+        )
+    )
     return folder
 
 
@@ -74,6 +95,7 @@ def write(folder: Path, renderer: str, image: NDArray[np.float32], website: bool
     Image(image).save(path)
     if website:
         import imageio.v3 as imageio
+
         imageio.imwrite(path.with_name(f"{renderer}-golden.thumb.webp"), imageio.imread(path), lossless=True)
 
 
@@ -107,7 +129,8 @@ def test_an_image_alone_and_what_is_missing(tmp_path: Path) -> None:
     assert next(judge(scenarios(folder), SIZE, 1)).row["result"] == "not read"
     (folder / GENERATOR / "environments" / "sky.hdr").unlink()
     assert next(judge(scenarios(folder), SIZE, 1)).row["problems"] == [
-        str(folder / GENERATOR / "environments" / "sky.hdr")]
+        str(folder / GENERATOR / "environments" / "sky.hdr")
+    ]
     (folder / GENERATOR / "test" / "config.json").write_text('{"scenarios": [7]}')
     with pytest.raises(UsageError, match="is not a list of scenarios"):
         scenarios(folder)
@@ -155,8 +178,13 @@ def test_reduction_keeps_means() -> None:
 
 def shrunk_by_pillow(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
     """Resize (h, w, c) with Pillow's Lanczos kernel, which has three lobes as well."""
-    return np.stack([np.asarray(PIL.Image.fromarray(channel).resize(size, PIL.Image.Resampling.LANCZOS))
-                     for channel in pixels.transpose(2, 0, 1)], axis=2)
+    return np.stack(
+        [
+            np.asarray(PIL.Image.fromarray(channel).resize(size, PIL.Image.Resampling.LANCZOS))
+            for channel in pixels.transpose(2, 0, 1)
+        ],
+        axis=2,
+    )
 
 
 @pytest.mark.parametrize("size", [(28, 20), (21, 10), (42, 30), (50, 40)])
@@ -200,6 +228,7 @@ def test_clrt_s_image_is_shrunk_as_the_website_s(tmp_path: Path, monkeypatch: py
 def test_images_are_decoded_as_they_were_encoded(tmp_path: Path) -> None:
     """Cycles' images use a power curve, others sRGB; transparency is over white; other aspect ratios are ignored."""
     import imageio.v3 as imageio
+
     texels = np.full((4, 4, 4), 51, np.uint8)
     texels[..., 3] = 255
     texels[:, 2:, 3] = 0
@@ -214,8 +243,10 @@ def test_images_are_decoded_as_they_were_encoded(tmp_path: Path) -> None:
 
 def test_one_of_the_others_may_be_far_off() -> None:
     """clrt may differ from the others as much as the most distant of them; means within their range and 5 %."""
-    images = {name: np.full((32, 32, 3), value, np.float32)
-              for name, value in {"clrt": 0.3, "a": 0.5, "b": 0.5, "c": 0.2}.items()}
+    images = {
+        name: np.full((32, 32, 3), value, np.float32)
+        for name, value in {"clrt": 0.3, "a": 0.5, "b": 0.5, "c": 0.2}.items()
+    }
     means = {"": {name: float(image.mean()) for name, image in images.items()}}
     assert verdict(images, means)["result"] == "inside"
     images["clrt"] = np.full((32, 32, 3), 0.1, np.float32)
@@ -229,8 +260,17 @@ def test_command(tmp_path: Path) -> None:
     folder = suite(tmp_path)
     write(folder, "vray", expected(False))
     write(folder, "stellar", expected(False))
-    arguments = [str(folder), "--width", "16", "--spp", "1", "--json", str(tmp_path / "a.json"),
-                 "--pictures", str(tmp_path / "pictures")]
+    arguments = [
+        str(folder),
+        "--width",
+        "16",
+        "--spp",
+        "1",
+        "--json",
+        str(tmp_path / "a.json"),
+        "--pictures",
+        str(tmp_path / "pictures"),
+    ]
     run = CliRunner().invoke(render_fidelity_command, arguments, catch_exceptions=False)
     assert run.exit_code == 0 and "wall" in run.output and (tmp_path / "pictures" / "wall.png").is_file()
     assert json.loads((tmp_path / "a.json").read_text())["scenarios"][0]["scenario"] == "wall"

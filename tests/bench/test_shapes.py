@@ -30,7 +30,7 @@ def test_icosphere_is_a_closed_sphere_of_even_triangles(subdivisions: int) -> No
     np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1, atol=1e-6)
     assert areas(vertices, faces).max() < 2 * areas(vertices, faces).min()
     if subdivisions == 0:
-        edge = 4 / (10 + 2 * 5**0.5)**0.5
+        edge = 4 / (10 + 2 * 5**0.5) ** 0.5
         assert areas(vertices, faces).sum() == pytest.approx(5 * 3**0.5 * edge**2)
 
 
@@ -79,7 +79,7 @@ def test_aimed_rays_go_where_they_say() -> None:
     assert distances.min(axis=1).max() < 1e-6
     a, b = (vertices[faces[:, k]].astype(np.float64) for k in ((0, 1, 2), (1, 2, 0)))
     a, b = a.reshape(-1, 3), b.reshape(-1, 3)
-    along = np.clip(np.einsum("nmk,mk->nm", ends["edges"][:, None] - a, b - a) / ((b - a)**2).sum(1), 0, 1)
+    along = np.clip(np.einsum("nmk,mk->nm", ends["edges"][:, None] - a, b - a) / ((b - a) ** 2).sum(1), 0, 1)
     beside = ends["edges"][:, None] - a - along[..., None] * (b - a)
     assert np.linalg.norm(beside, axis=2).min(axis=1).max() < 1e-6
     assert np.linalg.norm(kinds["edges"][0], axis=1).max() < 0.31, "from the inside"

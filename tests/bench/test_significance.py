@@ -16,16 +16,20 @@ def test_chi2_is_pearsons() -> None:
     assert chi2_test(observed, expected) == pytest.approx(chisquare(observed, expected).pvalue, rel=1e-12)
 
 
-@pytest.mark.parametrize("observed, expected, pooled_observed, pooled_expected", [
-    # 1 + 2 < 5, so the next larger cell, 10, joins the pool.
-    ([3, 0, 9, 30, 58], [1, 2, 10, 27, 60], [12, 30, 58], [13, 27, 60]),
-    # 2 + 4 is enough by itself, and order does not matter.
-    ([60, 3, 30, 7], [64, 4, 30, 2], [10, 30, 60], [6, 30, 64]),
-    # Cells with expectation and count 0 are no evidence.
-    ([40, 0, 60], [50, 0, 50], [40, 60], [50, 50]),
-])
-def test_chi2_pools_rare_cells(observed: list[int], expected: list[int], pooled_observed: list[int],
-                               pooled_expected: list[int]) -> None:
+@pytest.mark.parametrize(
+    "observed, expected, pooled_observed, pooled_expected",
+    [
+        # 1 + 2 < 5, so the next larger cell, 10, joins the pool.
+        ([3, 0, 9, 30, 58], [1, 2, 10, 27, 60], [12, 30, 58], [13, 27, 60]),
+        # 2 + 4 is enough by itself, and order does not matter.
+        ([60, 3, 30, 7], [64, 4, 30, 2], [10, 30, 60], [6, 30, 64]),
+        # Cells with expectation and count 0 are no evidence.
+        ([40, 0, 60], [50, 0, 50], [40, 60], [50, 50]),
+    ],
+)
+def test_chi2_pools_rare_cells(
+    observed: list[int], expected: list[int], pooled_observed: list[int], pooled_expected: list[int]
+) -> None:
     by_hand = chisquare(pooled_observed, pooled_expected).pvalue
     assert chi2_test(observed, expected) == pytest.approx(by_hand, rel=1e-12)
 

@@ -21,8 +21,13 @@ from clrt.rendering.renderer import Renderer
 from clrt.scene.validation.validate import scene_problems
 
 MODELS = Path(__file__).parents[2] / "scenes" / "models"
-FIGURES = {"dragon": (dragon(), 19_332), "wood": (tree()[0], 84), "leaves": (tree()[1], 180),
-           "statue": (statue(1), 27_920), "column": (column(1), 3_924)}
+FIGURES = {
+    "dragon": (dragon(), 19_332),
+    "wood": (tree()[0], 84),
+    "leaves": (tree()[1], 180),
+    "statue": (statue(1), 27_920),
+    "column": (column(1), 3_924),
+}
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -49,8 +54,10 @@ def test_a_straight_tube_is_a_prism() -> None:
 def test_the_models_that_ship_are_these(tmp_path: Path) -> None:
     write_models(tmp_path)
     for name in ("dragon.ply", "tree.obj"):
-        ours, shipped = (joined([(mesh.vertices, mesh.faces) for mesh in read_model(folder / name).meshes])
-                         for folder in (tmp_path, MODELS))
+        ours, shipped = (
+            joined([(mesh.vertices, mesh.faces) for mesh in read_model(folder / name).meshes])
+            for folder in (tmp_path, MODELS)
+        )
         np.testing.assert_allclose(ours[0], shipped[0], atol=1e-6)
         np.testing.assert_array_equal(ours[1], shipped[1])
     assert {mesh.material_name for mesh in read_model(MODELS / "tree.obj").meshes} == {"wood", "leaves"}
@@ -82,11 +89,17 @@ def test_every_row_of_the_theses_is_there() -> None:
     """The theses' published figures are included, by the name of the experiment."""
     found: dict[str, list[float]] = {
         experiment.name: [1 / variant.theirs for variant in experiment.variants if variant.theirs]
-        for experiment in experiments(QUICK)}
+        for experiment in experiments(QUICK)
+    }
     rastered: dict[str, list[float]] = {"shadows": [540], "mirrors": [530]} if len(found["shadows"]) > 1 else {}
     expected: dict[str, list[float]] = {
-        "dragon": [1 / 0.01954, 1 / 0.697], "tree": [1 / 0.00776, 1 / 0.06], "shadows": [537],
-        "mirrors": [446, 440, 435], "mirror": [215, 187, 174], "far": [300, 277, 268]}
+        "dragon": [1 / 0.01954, 1 / 0.697],
+        "tree": [1 / 0.00776, 1 / 0.06],
+        "shadows": [537],
+        "mirrors": [446, 440, 435],
+        "mirror": [215, 187, 174],
+        "far": [300, 277, 268],
+    }
     for name, values in expected.items():
         assert found[name] == pytest.approx(values + rastered.get(name, []))
 
@@ -100,8 +113,13 @@ def test_figures_of_frames(device: Device) -> None:
     assert rows["with a tree"]["samples"] == 6 * 55 * 33 and rows["with a tree"]["frames"] in (1, 2)
     for name, row in rows.items():
         assert row["seconds"] > 0 and row["frames_per_second"] == 1 / row["seconds"]
-        assert row["layout"] == ("list" if name.startswith("without") and "eight" not in name else
-                                 "packs" if "eight" in name else device.layout)
+        assert row["layout"] == (
+            "list"
+            if name.startswith("without") and "eight" not in name
+            else "packs"
+            if "eight" in name
+            else device.layout
+        )
         assert 1.2 < row["rays"] / row["samples"] < 4
     assert rows["without, 2 bounces, 1 ray"]["rays"] < rows["without"]["rays"] / 4
     assert [ratio["theirs"] for ratio in result["ratios"]] == [None, None, pytest.approx(697 / 19.54), None]
@@ -129,10 +147,14 @@ main(["bench", "theses", "--quick", "--tree", {str(MODELS / "tree.obj")!r}, "--j
 
 
 def test_mistakes_end_in_one_message(tmp_path: Path) -> None:
-    for arguments, code, words in [(["--json", "no/t.json"], 6, "no/t.json"), (["--dragon", "no.ply"], 3, "no.ply"),
-                                   (["--device", "nonesuch"], 4, "nonesuch")]:
-        done = subprocess.run([sys.executable, "-m", "clrt", "bench", "theses", *arguments], cwd=tmp_path, text=True,
-                              capture_output=True)
+    for arguments, code, words in [
+        (["--json", "no/t.json"], 6, "no/t.json"),
+        (["--dragon", "no.ply"], 3, "no.ply"),
+        (["--device", "nonesuch"], 4, "nonesuch"),
+    ]:
+        done = subprocess.run(
+            [sys.executable, "-m", "clrt", "bench", "theses", *arguments], cwd=tmp_path, text=True, capture_output=True
+        )
         assert done.returncode == code and words in done.stderr and "Traceback" not in done.stderr
 
 

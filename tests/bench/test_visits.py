@@ -53,8 +53,9 @@ def boxes(query: clrt.RayQuery) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any
 
 @pytest.mark.parametrize(("layout", "traversal"), [("bvh8", "pool"), ("bvh8", "single"), ("bvh2", "single")])
 @pytest.mark.parametrize("any_hit", [False, True])
-def test_rays_that_hit_nothing_visit_what_they_enter(device: Device, layout: str, traversal: str,
-                                                     any_hit: bool) -> None:
+def test_rays_that_hit_nothing_visit_what_they_enter(
+    device: Device, layout: str, traversal: str, any_hit: bool
+) -> None:
     query = clrt.RayQuery(*BALL, device=device.info.index, layout=layout, builder="sah", traversal=traversal)
     assert query.frame.unit == 1
     low, high, nodes, tests = boxes(query)
@@ -63,7 +64,7 @@ def test_rays_that_hit_nothing_visit_what_they_enter(device: Device, layout: str
     clear = (small == large).all(axis=1) & (query.closest_hit(*rays)["primitive"] < 0)
     assert clear.sum() > 1000
     visits = visits_a_ray(query, (rays[0][clear], rays[1][clear], rays[2][clear]), any_hit=any_hit)
-    root = 1 if layout == "bvh8" else 0    # the root's own box is not included
+    root = 1 if layout == "bvh8" else 0  # the root's own box is not included
     assert visits["nodes"] == pytest.approx(root + (large[clear] @ nodes.astype(int)).mean())
     assert visits["tests"] == pytest.approx((large[clear] @ tests.astype(int)).mean())
     assert visits["tests"] > 0.05

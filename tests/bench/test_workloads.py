@@ -32,8 +32,10 @@ from ..rendering.rays import icosphere
 Doubles = NDArray[np.float64]
 RNG = np.random.default_rng(11)
 #: A tetrahedron with a right-angled corner at the origin, volume 1/6 · 1·2·3, and all edges of different length.
-TETRAHEDRON = (np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], np.float32),
-               np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32))
+TETRAHEDRON = (
+    np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], np.float32),
+    np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32),
+)
 
 
 def corners(vertices: Floats, faces: Faces) -> Doubles:
@@ -153,7 +155,7 @@ def test_bounces_are_cosine_distributed() -> None:
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     across = np.einsum("ij,ij->i", directions, np.cross(normals, tangents))
     azimuth = np.arctan2(across, np.einsum("ij,ij->i", directions, tangents)) / (2 * np.pi) % 1
-    cells = np.histogram2d(np.maximum(cosines, 0)**2, azimuth, bins=12, range=[[0, 1], [0, 1]])[0]
+    cells = np.histogram2d(np.maximum(cosines, 0) ** 2, azimuth, bins=12, range=[[0, 1], [0, 1]])[0]
     assert chi2_test(cells, np.full((12, 12), count / 144)) > sidak(1e-3, 1)
 
 
@@ -176,7 +178,11 @@ def test_workloads_are_what_their_names_say(device: Device) -> None:
     query = clrt.RayQuery(*room, device=device.info.index)
     kinds = {kind.name: kind for kind in workloads(*room, ball[0], query.closest_hit, (120, 90))}
     assert {name: kind.any_hit for name, kind in kinds.items()} == {
-        "primary": False, "bounce": False, "shadow": True, "occluded": True}
+        "primary": False,
+        "bounce": False,
+        "shadow": True,
+        "occluded": True,
+    }
     primary = query.closest_hit(*kinds["primary"].rays)["primitive"]
     assert len(primary) == 120 * 90 and (primary >= 0).all()
     assert 0.2 < np.mean(primary < len(ball[1])) < 0.8, "half ball, half wall"

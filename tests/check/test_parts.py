@@ -43,8 +43,14 @@ def test_the_nearest_float() -> None:
     doubles = np.random.default_rng(0).normal(size=1000) * 2.0 ** np.random.default_rng(1).integers(-60, 60, 1000)
     assert [nearest_float32(Fraction(double)) for double in doubles] == list(doubles.astype(np.float32))
     half, ulp, hair = Fraction(1, 1 << 24), Fraction(1, 1 << 23), Fraction(1, 1 << 80)
-    for exact, nearest in [(1 + half, 1), (1 + half + hair, 1 + ulp), (1 + half - hair, 1), (-1 - half, -1),
-                           (1 + ulp + half, 1 + 2 * ulp), (-1 - half - hair, -1 - ulp)]:
+    for exact, nearest in [
+        (1 + half, 1),
+        (1 + half + hair, 1 + ulp),
+        (1 + half - hair, 1),
+        (-1 - half, -1),
+        (1 + ulp + half, 1 + 2 * ulp),
+        (-1 - half - hair, -1 - ulp),
+    ]:
         assert Fraction(float(nearest_float32(exact))) == nearest
 
 
@@ -62,7 +68,7 @@ def test_operands_round_to_all_sides() -> None:
         assert np.mean(error > 0) > 0.1 and np.mean(error < 0) > 0.1 and np.mean(np.abs(error) == 0.5) > 0.05
         assert np.all((np.abs(exact) > 2.0**-126) & (np.abs(exact) < 2.0**127))
     separate = (a * b).astype(np.float32) + c
-    assert np.mean(np.abs(separate) < np.abs(a * b) * 2.0**-20) > 0.2     # there the result of fma is rounding error
+    assert np.mean(np.abs(separate) < np.abs(a * b) * 2.0**-20) > 0.2  # there the result of fma is rounding error
 
 
 def test_the_star_is_closed_and_seen_from_inside() -> None:

@@ -17,12 +17,19 @@ from .sabotage import sabotaged
 #: The part that must detect it, the replaced pattern in the kernels, its replacement, and a line before the file.
 SABOTAGES = {
     "roots left out": ("arithmetic", r"\bsqrt\(", "("),
-    "an fma that rounds twice": ("arithmetic", r"\bfma\(", "TWICE(",
-                                 "#define TWICE(a, b, c) (fma(a, b, (c) * 0.0f) + (c))"),
+    "an fma that rounds twice": (
+        "arithmetic",
+        r"\bfma\(",
+        "TWICE(",
+        "#define TWICE(a, b, c) (fma(a, b, (c) * 0.0f) + (c))",
+    ),
     "a minimum that keeps NaN": ("comparisons", r"return a < b \? a : b;", "return b < a ? b : a;"),
     "one bit too many": ("integers", r"\bpopcount\(", "1 + popcount("),
-    "conversion that truncates": ("integers", r"PASTE\(convert_float, LANES\)",
-                                  "PASTE(PASTE(convert_float, LANES), _rtz)"),
+    "conversion that truncates": (
+        "integers",
+        r"PASTE\(convert_float, LANES\)",
+        "PASTE(PASTE(convert_float, LANES), _rtz)",
+    ),
     "the lane before": ("masks", r"popcount\(~bits & \(bits - 1\)\)", "popcount(~bits & (bits - 1)) - 1"),
     "an atomic that is none": ("memory", r"\batomic_max\(", "SET(", "#define SET(place, value) (*(place) = (value))"),
     "another hash": ("random numbers", r"1664525u", "1664527u"),
@@ -31,11 +38,17 @@ SABOTAGES = {
     "cracks between triangles": ("rays", r"e->u1 >= e->u2\)(.*)e->u1 <= e->u2\)", r"e->u1 > e->u2)\1e->u1 < e->u2)"),
     "the far child forgotten": ("binary tree", r"distance\[top\+\+\] = far;", ""),
     "boxes too small": ("tree builder", r"box_union\(Box a, Box b\) \{", r"\g<0>\n    b = a;"),
-    "paint that swallows light": ("furnace", r"sample.weight = (m->color);",
-                                  r"sample.weight = scale(\1, (real)(0.999999f));"),
+    "paint that swallows light": (
+        "furnace",
+        r"sample.weight = (m->color);",
+        r"sample.weight = scale(\1, (real)(0.999999f));",
+    ),
     "light that does not fade": ("lamp", r"inverse \* inverse", "inverse"),
-    "balls that light themselves": ("ball", r"best_cosine\(dot3\(n, d\), distance, r\)",
-                                    "best_cosine(dot3(n, d), distance, 1.0001f * r)"),
+    "balls that light themselves": (
+        "ball",
+        r"best_cosine\(dot3\(n, d\), distance, r\)",
+        "best_cosine(dot3(n, d), distance, 1.0001f * r)",
+    ),
     "weights that sum to two": ("room", r"return 1.0f / \(1.0f \+ ratio \* ratio\);", "return ONE;"),
     "a density off by a tenth": ("room", r"return t \* t / \(absolute", "return 1.1f * t * t / (absolute"),
 }

@@ -44,9 +44,17 @@ def call(arguments: Iterable[str]) -> Result:
 
 
 @pytest.mark.parametrize("option", FILES.values())
-@pytest.mark.parametrize(("path", "kind"), [
-    ("no/such/f.svg", OutputError), (".", OutputError), ("old.svg", OutputError), ("pipe.svg", OutputError),
-    ("a.obj", UsageError), ("./a.obj", UsageError)])
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [
+        ("no/such/f.svg", OutputError),
+        (".", OutputError),
+        ("old.svg", OutputError),
+        ("pipe.svg", OutputError),
+        ("a.obj", UsageError),
+        ("./a.obj", UsageError),
+    ],
+)
 def test_nothing_is_begun_in_vain(option: str, path: str, kind: type[ClrtError]) -> None:
     """Refused if the folder is missing, or the file is a folder, read-only, a pipe, or an input of the experiment."""
     result = call(["--mesh", "b.obj", "--mesh", "a.obj", option, path])
@@ -59,8 +67,12 @@ def test_one_file_twice() -> None:
 
 def test_what_is_begun(folder: Path) -> None:
     """Read-only files are accepted with --force; folders for images are created at the start."""
-    for arguments in (["--json", "new.json", "--plot", "new.svg"], ["--json", "old.svg", "--force"],
-                      ["--pictures", "some/where"], []):
+    for arguments in (
+        ["--json", "new.json", "--plot", "new.svg"],
+        ["--json", "old.svg", "--force"],
+        ["--pictures", "some/where"],
+        [],
+    ):
         result = call(["--mesh", "a.obj", *arguments])
         assert result.exception is None, result.exception
     assert CALLED == [Path("new.json"), Path("old.svg"), None, None] and (folder / "some/where").is_dir()
@@ -74,18 +86,22 @@ def test_every_experiment_is_checked(name: str) -> None:
     options = {option: parameter.name for parameter in each.params for option in parameter.opts}
     assert options["--json"] == "json_file" and "--force" in options
     assert all(options.get(option) in (name, None) for name, option in FILES.items())
-    folders = {parameter.name for parameter in each.params if parameter.metavar == "DIR"
-               and isinstance(parameter, click.Option)}
+    folders = {
+        parameter.name
+        for parameter in each.params
+        if parameter.metavar == "DIR" and isinstance(parameter, click.Option)
+    }
     assert folders <= set(FOLDERS)
 
 
-def test_figures_are_not_lost(folder: Path, tmp_path_factory: pytest.TempPathFactory,
-                              capsys: pytest.CaptureFixture[str]) -> None:
+def test_figures_are_not_lost(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, capsys: pytest.CaptureFixture[str]
+) -> None:
     gone = tmp_path_factory.mktemp("gone")
     shutil.rmtree(gone)
     with pytest.raises(OutputError, match="written to .* instead"):
         write_figures(gone / "f.json", {"a": 1})
-    kept, = folder.glob("f-*.json")
+    (kept,) = folder.glob("f-*.json")
     assert json.loads(kept.read_text()) == {"a": 1} and capsys.readouterr().out == ""
     write_figures(Path("f.json"), {"a": 2})
     assert json.loads(Path("f.json").read_text()) == {"a": 2} and capsys.readouterr().out == "f.json\n"

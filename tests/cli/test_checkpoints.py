@@ -38,8 +38,19 @@ type = "point"
 position = [2, 3, 2]
 intensity = [20, 20, 20]
 """
-RENDER = ("render", "ball.toml", "--checkpoint", "a.ck", "--resume", "--checkpoint-every", "0", "--progress", "json",
-          "-o", "a.exr")
+RENDER = (
+    "render",
+    "ball.toml",
+    "--checkpoint",
+    "a.ck",
+    "--resume",
+    "--checkpoint-every",
+    "0",
+    "--progress",
+    "json",
+    "-o",
+    "a.exr",
+)
 
 
 @pytest.fixture
@@ -59,8 +70,13 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 def started(*options: str, cwd: Path) -> subprocess.Popen[str]:
     """Start RENDER and return once it reports that it renders."""
-    process = subprocess.Popen([sys.executable, "-m", "clrt", *RENDER, *options], cwd=cwd, stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "clrt", *RENDER, *options],
+        cwd=cwd,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     assert process.stderr is not None
     while (line := process.stderr.readline()) and '"render"' not in line:
         assert process.poll() is None
@@ -82,8 +98,9 @@ def arrays(path: Path) -> dict[str, bytes]:
     return {name: array.tobytes() for name, array in read_checkpoint(path, KINDS)[1].items() if name != "history"}
 
 
-@pytest.mark.parametrize("kills, options", [(3, ["--spp", "2000"]), (2, ["--spp", "600", "--adaptive"])],
-                         ids=["even", "adaptive"])
+@pytest.mark.parametrize(
+    "kills, options", [(3, ["--spp", "2000"]), (2, ["--spp", "600", "--adaptive"])], ids=["even", "adaptive"]
+)
 def test_killed_at_any_moment_it_ends_as_if_it_were_not(folder: Path, kills: int, options: list[str]) -> None:
     """After several kills and resumes, film, samples and estimate equal those of an undisturbed render, bit for bit."""
     left_alone = folder / "alone"
@@ -122,7 +139,7 @@ def test_the_first_signal_keeps_everything(folder: Path, number: signal.Signals)
 
 def test_the_second_signal_ends_it_now(folder: Path) -> None:
     process = started("--time", "600", cwd=folder)
-    for number in (signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGCONT):    # both are pending as it continues
+    for number in (signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGCONT):  # both are pending as it continues
         process.send_signal(number)
     output, messages = process.communicate(timeout=60)
     assert process.returncode == 130 and output == "" and "Traceback" not in messages
@@ -145,15 +162,20 @@ def test_a_full_disk_ends_no_render(folder: Path) -> None:
     assert not list(folder.glob("*.new")) and not list(folder.glob(".clrt*"))
 
 
-@pytest.mark.parametrize(("options", "code", "words"), [
-    (("--resume",), 2, ["--resume", "--checkpoint"]),
-    (("--checkpoint", "no/a.ck"), 6, ["no/a.ck"]),
-    (("--checkpoint", "a.png", "-o", "a.png"), 2, ["a.png", "--checkpoint"]),
-    (("--checkpoint", "a.ck", "--checkpoint-every", "-1"), 2, ["--checkpoint-every"]),
-    (("--checkpoint", "a.ck", "--resume", "--seed", "3"), 3, ["a.ck", "seed 0 instead of 3", "--resume"]),
-    (("--checkpoint", "b.ck", "--resume"), 3, ["b.ck", "not a checkpoint", "remove it"])])
-def test_mistakes_end_in_one_message(folder: Path, content: bytes, options: tuple[Any, ...], code: int,
-                                     words: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("options", "code", "words"),
+    [
+        (("--resume",), 2, ["--resume", "--checkpoint"]),
+        (("--checkpoint", "no/a.ck"), 6, ["no/a.ck"]),
+        (("--checkpoint", "a.png", "-o", "a.png"), 2, ["a.png", "--checkpoint"]),
+        (("--checkpoint", "a.ck", "--checkpoint-every", "-1"), 2, ["--checkpoint-every"]),
+        (("--checkpoint", "a.ck", "--resume", "--seed", "3"), 3, ["a.ck", "seed 0 instead of 3", "--resume"]),
+        (("--checkpoint", "b.ck", "--resume"), 3, ["b.ck", "not a checkpoint", "remove it"]),
+    ],
+)
+def test_mistakes_end_in_one_message(
+    folder: Path, content: bytes, options: tuple[Any, ...], code: int, words: list[str]
+) -> None:
     (folder / "a.ck").write_bytes(content)
     (folder / "b.ck").write_text("something else")
     result = clrt("render", "ball.toml", "--spp", "1", *options, cwd=folder)

@@ -31,9 +31,31 @@ radius = 1
 material = "red"
 """
 REPORT_FIELDS = {
-    "scene", "device", "platform", "driver", "version", "width", "height", "spp", "integrator", "max_depth", "seed",
-    "seconds", "samples", "samples_per_second", "rays", "rays_per_second", "stop_reason", "noise", "nonfinite_samples",
-    "bvh", "kernel", "peak_device_bytes", "history", "total_seconds"}
+    "scene",
+    "device",
+    "platform",
+    "driver",
+    "version",
+    "width",
+    "height",
+    "spp",
+    "integrator",
+    "max_depth",
+    "seed",
+    "seconds",
+    "samples",
+    "samples_per_second",
+    "rays",
+    "rays_per_second",
+    "stop_reason",
+    "noise",
+    "nonfinite_samples",
+    "bvh",
+    "kernel",
+    "peak_device_bytes",
+    "history",
+    "total_seconds",
+}
 BVH_FIELDS = {"triangles", "spheres", "instances", "nodes", "bytes", "build_seconds", "sah_cost", "layout"}
 
 
@@ -70,8 +92,20 @@ def test_default_output_is_named_after_the_scene(scene: Path) -> None:
 def test_command_line_overrides_the_scene_and_measures_against_a_reference(scene: Path) -> None:
     options = ("--size", "8x8", "--seed", "7", "--depth", "2")
     assert clrt("render", scene, *options, "--spp", "512", "-o", "ref.exr", cwd=scene.parent).returncode == 0
-    result = clrt("render", scene, *options, "--spp", "8", "--reference", "ref.exr", "--report", "r.json",
-                  "--progress", "json", cwd=scene.parent)
+    result = clrt(
+        "render",
+        scene,
+        *options,
+        "--spp",
+        "8",
+        "--reference",
+        "ref.exr",
+        "--report",
+        "r.json",
+        "--progress",
+        "json",
+        cwd=scene.parent,
+    )
     report = json.loads((scene.parent / "r.json").read_text())
     assert (report["width"], report["height"], report["seed"], report["max_depth"]) == (8, 8, 7, 2)
     assert all(entry["relmse"] >= 0 for entry in report["history"])
@@ -86,7 +120,8 @@ def test_warnings_are_json_where_progress_is(scene: Path) -> None:
     lines = [json.loads(line) for line in result.stderr.splitlines()]
     assert all("phase" in line for line in lines)
     assert [line["warning"] for line in lines if "warning" in line] == [
-        "ball: the image is black: nothing in this scene emits light"]
+        "ball: the image is black: nothing in this scene emits light"
+    ]
 
 
 def test_time_and_error_end_a_render(scene: Path) -> None:
@@ -98,8 +133,21 @@ def test_time_and_error_end_a_render(scene: Path) -> None:
 
 
 def test_interrupt_keeps_the_picture(scene: Path) -> None:
-    command = [sys.executable, "-m", "clrt", "render", str(scene), "--time", "600", "-o", "i.exr", "--report", "i.json",
-               "--progress", "json"]
+    command = [
+        sys.executable,
+        "-m",
+        "clrt",
+        "render",
+        str(scene),
+        "--time",
+        "600",
+        "-o",
+        "i.exr",
+        "--report",
+        "i.json",
+        "--progress",
+        "json",
+    ]
     process = subprocess.Popen(command, cwd=scene.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     while '"spp"' not in process.stderr.readline():
@@ -116,8 +164,13 @@ def test_caches_that_cannot_be_written_cost_nothing_but_time(scene: Path) -> Non
     """PoCL hides its device without a cache folder; here the home is a file, so that the test also works as root."""
     (scene.parent / "home").write_text("")
     environment = {key: value for key, value in os.environ.items() if key not in ("XDG_CACHE_HOME", "POCL_CACHE_DIR")}
-    result = subprocess.run([sys.executable, "-m", "clrt", "render", str(scene), "-q"], cwd=scene.parent, text=True,
-                            capture_output=True, env={**environment, "HOME": str(scene.parent / "home")})
+    result = subprocess.run(
+        [sys.executable, "-m", "clrt", "render", str(scene), "-q"],
+        cwd=scene.parent,
+        text=True,
+        capture_output=True,
+        env={**environment, "HOME": str(scene.parent / "home")},
+    )
     assert (result.returncode, result.stdout) == (0, "ball.png\n"), result.stderr
 
 
@@ -146,36 +199,39 @@ file = "nowhere.ply"
     assert not list(tmp_path.glob("*.png"))
 
 
-@pytest.mark.parametrize(("arguments", "code", "words"), [
-    (("render", "missing.toml"), 3, ["missing.toml"]),
-    (("render", "loop.toml"), 3, ["loop.toml: no such scene file"]),
-    (("render", "x.png"), 3, ["x.png: a scene must be one of .toml"]),
-    (("render", "."), 3, [".: is a folder, not a scene"]),
-    (("convert", "nope.obj", "z.toml"), 3, ["nope.obj: no such model file"]),
-    (("render", "ball.toml", "--reference", "ball.toml"), 3, ["ball.toml: cannot be decoded as an image"]),
-    (("render", "ball.toml", "-o", "no/such/folder/x.png"), 6, ["no/such/folder"]),
-    (("render", "ball.toml", "-o", "x.pgn"), 6, [".pgn", "did you mean", ".png"]),
-    (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),
-    (("render", "ball.toml", "--size", "0x4"), 2, ["0x4"]),
-    (("render", "ball.toml", "--view", "srbg"), 2, ["srbg"]),
-    (("render", "ball.toml", "-q", "--view", "ocio:Nope"), 2, ["view 'Nope' is unknown"]),
-    (("render", "ball.toml", "--exposure", "nan"), 2, ["exposure is nan", "finite"]),
-    (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
-    (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),
-    (("render", "ball.toml", "--time", "inf"), 2, ["time is inf; it must be above 0 and finite"]),
-    (("render", "ball.toml", "-o", "r.exr", "--reference", "r.exr"), 2, ["r.exr", "reference"]),
-    (("render", "ball.toml", "--size", "60000x60000"), 4, ["60000x60000", "GiB", "--size"]),
-    (("compare", "ball.toml", "ball.toml"), 3, ["ball.toml"]),
-    (("rendr", "ball.toml"), 2, ['command "rendr" is unknown; did you mean "render"?']),
-    (("bench", "raiz"), 2, ['command "raiz" is unknown; write one of agree,']),
-])
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("render", "missing.toml"), 3, ["missing.toml"]),
+        (("render", "loop.toml"), 3, ["loop.toml: no such scene file"]),
+        (("render", "x.png"), 3, ["x.png: a scene must be one of .toml"]),
+        (("render", "."), 3, [".: is a folder, not a scene"]),
+        (("convert", "nope.obj", "z.toml"), 3, ["nope.obj: no such model file"]),
+        (("render", "ball.toml", "--reference", "ball.toml"), 3, ["ball.toml: cannot be decoded as an image"]),
+        (("render", "ball.toml", "-o", "no/such/folder/x.png"), 6, ["no/such/folder"]),
+        (("render", "ball.toml", "-o", "x.pgn"), 6, [".pgn", "did you mean", ".png"]),
+        (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),
+        (("render", "ball.toml", "--size", "0x4"), 2, ["0x4"]),
+        (("render", "ball.toml", "--view", "srbg"), 2, ["srbg"]),
+        (("render", "ball.toml", "-q", "--view", "ocio:Nope"), 2, ["view 'Nope' is unknown"]),
+        (("render", "ball.toml", "--exposure", "nan"), 2, ["exposure is nan", "finite"]),
+        (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
+        (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),
+        (("render", "ball.toml", "--time", "inf"), 2, ["time is inf; it must be above 0 and finite"]),
+        (("render", "ball.toml", "-o", "r.exr", "--reference", "r.exr"), 2, ["r.exr", "reference"]),
+        (("render", "ball.toml", "--size", "60000x60000"), 4, ["60000x60000", "GiB", "--size"]),
+        (("compare", "ball.toml", "ball.toml"), 3, ["ball.toml"]),
+        (("rendr", "ball.toml"), 2, ['command "rendr" is unknown; did you mean "render"?']),
+        (("bench", "raiz"), 2, ['command "raiz" is unknown; write one of agree,']),
+    ],
+)
 def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], code: int, words: list[str]) -> None:
     scene.with_name("loop.toml").symlink_to("loop.toml")
     scene.with_name("x.png").touch()
     result = clrt(*arguments, cwd=scene.parent)
     assert result.returncode == code and result.stdout == ""
     assert "Traceback" not in result.stderr and all(word in result.stderr for word in words), result.stderr
-    assert "leaked" not in result.stderr    # OpenImageIO reports objects leaked at exit
+    assert "leaked" not in result.stderr  # OpenImageIO reports objects leaked at exit
 
 
 def test_print_kernel_prints_what_the_scene_needs(scene: Path) -> None:
@@ -206,8 +262,21 @@ def test_info_lists_materials_and_presets(scene: Path) -> None:
 
 def test_devices_lists_the_one_in_use(scene: Path) -> None:
     devices = json.loads(clrt("devices", "--json", cwd=scene.parent).stdout)
-    fields = {"index", "id", "name", "platform", "platform_version", "driver", "type", "compute_units", "global_bytes",
-              "max_alloc_bytes", "usable", "why", "chosen"}
+    fields = {
+        "index",
+        "id",
+        "name",
+        "platform",
+        "platform_version",
+        "driver",
+        "type",
+        "compute_units",
+        "global_bytes",
+        "max_alloc_bytes",
+        "usable",
+        "why",
+        "chosen",
+    }
     assert all(fields <= set(device) for device in devices)
     assert [device["chosen"] for device in devices].count(True) == 1
     chosen = next(device for device in devices if device["chosen"])
@@ -245,8 +314,12 @@ def test_error_is_reached_and_not_far_passed(scene: Path) -> None:
     """With Sobol' samples the error falls in steps, by a factor of up to 2 at powers of two."""
     scene.write_text(SCENE + '[[light]]\ntype = "point"\nposition = [0, 3, 1]\nintensity = [20, 20, 20]\n')
     for error, sampler, least in ((0.035, "independent", 0.85), (0.02, "independent", 0.85), (0.02, "sobol", 0.5)):
-        assert clrt("render", scene, "--error", error, "--sampler", sampler, "--report", "e.json",
-                    cwd=scene.parent).returncode == 0
+        assert (
+            clrt(
+                "render", scene, "--error", error, "--sampler", sampler, "--report", "e.json", cwd=scene.parent
+            ).returncode
+            == 0
+        )
         assert least * error < json.loads((scene.parent / "e.json").read_text())["noise"] <= error
 
 
@@ -265,8 +338,12 @@ def test_convert(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "scenes/a.toml\n", "")
     assert 'file = "../models/a.obj"' in (tmp_path / "scenes" / "a.toml").read_text()
     for name in ("models/a.obj", "scenes/a.toml"):
-        assert clrt("render", name, "-o", f"{Path(name).suffix[1:]}.exr", "--size", "16x16", "--spp", "4",
-                    cwd=tmp_path).returncode == 0
+        assert (
+            clrt(
+                "render", name, "-o", f"{Path(name).suffix[1:]}.exr", "--size", "16x16", "--spp", "4", cwd=tmp_path
+            ).returncode
+            == 0
+        )
     np.testing.assert_array_equal(read_image(tmp_path / "obj.exr"), read_image(tmp_path / "toml.exr"))
     done = clrt("convert", "models/a.obj", "scenes/a.toml", cwd=tmp_path)
     assert done.returncode == 2 and "already exists" in done.stderr and "--force" in done.stderr

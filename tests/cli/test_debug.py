@@ -50,16 +50,34 @@ def run(*arguments: object) -> Result:
 
 
 def test_the_default_is_the_pixel_in_the_center(scene: Path) -> None:
-    default, named = (json.loads(run(scene, *pixel, "--size", "9x6", "--json").output)
-                      for pixel in ([], ["--pixel", "4,3"]))
+    default, named = (
+        json.loads(run(scene, *pixel, "--size", "9x6", "--json").output) for pixel in ([], ["--pixel", "4,3"])
+    )
     assert default == named and default["pixel"] == [4, 3]
 
 
 def test_it_is_the_pixel_of_the_render(scene: Path) -> None:
     """The values equal those of `clrt render` with the same options."""
-    options = ("--size", "12x10", "--seed", "7", "--depth", "3", "--spp", "16", "--filter", "tent",
-               "--sampler", "stratified", "--clamp-direct", "0.5", "--clamp-indirect", "0.1",
-               "--back-face-culling", "camera")
+    options = (
+        "--size",
+        "12x10",
+        "--seed",
+        "7",
+        "--depth",
+        "3",
+        "--spp",
+        "16",
+        "--filter",
+        "tent",
+        "--sampler",
+        "stratified",
+        "--clamp-direct",
+        "0.5",
+        "--clamp-indirect",
+        "0.1",
+        "--back-face-culling",
+        "camera",
+    )
     assert clrt("render", scene, *options, "-o", "r.exr", "-q", cwd=scene.parent).returncode == 0
     pixels = read_image(scene.parent / "r.exr")
     for x, y in ((5, 3), (1, 8)):
@@ -67,8 +85,15 @@ def test_it_is_the_pixel_of_the_render(scene: Path) -> None:
         assert (result.returncode, result.stderr) == (0, "")
         found = json.loads(result.stdout)
         assert found["value"] == pytest.approx(pixels[y, x].tolist(), rel=1e-5) and max(found["value"]) > 0
-        sums = [[vertex[part]["contribution"] for vertex in sample["vertices"] for part in ("emission", "light_sample")
-                 if vertex[part]] for sample in found["samples"]]
+        sums = [
+            [
+                vertex[part]["contribution"]
+                for vertex in sample["vertices"]
+                for part in ("emission", "light_sample")
+                if vertex[part]
+            ]
+            for sample in found["samples"]
+        ]
         for total, sample in zip(sums, found["samples"], strict=True):
             assert [sum(each) for each in zip(*total)] == pytest.approx(sample["value"], rel=1e-5)
 
@@ -92,14 +117,18 @@ def test_a_shadow_says_what_casts_it(scene: Path) -> None:
     assert 'all 8 shadowed (by sphere "ball")' in run(scene, "--pixel", "12,8", "--samples", "0", "--depth", "2").stdout
 
 
-@pytest.mark.parametrize(("arguments", "kind", "words"), [
-    (("ball.toml", "--pixel", "24,0"), UsageError, "pixel 24,0 is outside the image of 24x16"),
-    (("ball.toml", "--pixel", "5,16", "--size", "16x8"), UsageError, "Y 0 to 7"),
-    (("nope.toml", "--pixel", "0,0"), SceneError, "nope.toml: no such scene file"),
-    (("local.toml", "--pixel", "0,0"), UsageError, 'integrator "local" traces no paths; choose path or direct'),
-])
-def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], kind: type[ClrtError],
-                                     words: str) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "kind", "words"),
+    [
+        (("ball.toml", "--pixel", "24,0"), UsageError, "pixel 24,0 is outside the image of 24x16"),
+        (("ball.toml", "--pixel", "5,16", "--size", "16x8"), UsageError, "Y 0 to 7"),
+        (("nope.toml", "--pixel", "0,0"), SceneError, "nope.toml: no such scene file"),
+        (("local.toml", "--pixel", "0,0"), UsageError, 'integrator "local" traces no paths; choose path or direct'),
+    ],
+)
+def test_mistakes_end_in_one_message(
+    scene: Path, arguments: tuple[str, ...], kind: type[ClrtError], words: str
+) -> None:
     scene.with_name("local.toml").write_text(SCENE.replace("spp = 8", 'spp = 8\nintegrator = "local"'))
     result = run(scene.with_name(arguments[0]), *arguments[1:])
     assert isinstance(result.exception, kind) and words in str(result.exception) and result.stdout == ""

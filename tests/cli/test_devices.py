@@ -90,10 +90,17 @@ def test_a_device_that_computes_wrong(best: str, tmp_path: Path) -> None:
 
 
 def test_a_driver_that_crashes(best: str, tmp_path: Path) -> None:
-    result = run(tmp_path, "devices", "--check", "--device", best, "--json",
-                 broken=(IN_FLOATS, r"\g<0>\n    *(volatile global int *)8 = 1;"))
+    result = run(
+        tmp_path,
+        "devices",
+        "--check",
+        "--device",
+        best,
+        "--json",
+        broken=(IN_FLOATS, r"\g<0>\n    *(volatile global int *)8 = 1;"),
+    )
     assert result.returncode == 4 and "Traceback" not in result.stderr
-    failure, = listed(result, best)["check"]["failures"]
+    (failure,) = listed(result, best)["check"]["failures"]
     assert failure.startswith("arithmetic: ") and "the driver crashed with signal 11" in failure
 
 
@@ -115,9 +122,14 @@ def test_a_check_that_runs_out_of_the_default_limit_has_failed(monkeypatch: pyte
     assert not verdict.passed and verdict.failures == ["starting: it did not finish in 0.01 s"]
 
 
-@pytest.mark.parametrize(("limit", "words"), [
-    ("nan", "'nan' is not a finite number"), ("inf", "'inf' is not a finite number"),
-    ("0.5", "0.5 is not in the range")])
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [
+        ("nan", "'nan' is not a finite number"),
+        ("inf", "'inf' is not a finite number"),
+        ("0.5", "0.5 is not in the range"),
+    ],
+)
 def test_limits_that_are_none(limit: str, words: str) -> None:
     refused = CliRunner().invoke(devices.command, ["--limit", limit])
     assert refused.exit_code == 2 and words in refused.output and "--limit" in refused.output

@@ -22,10 +22,22 @@ SECRET = "hunter2"
 
 def clrt(home: Path, *arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
     """Run clrt in the environment of the user jane, which contains a secret."""
-    own = {"HOME": str(home), "USER": "jane", "LOGNAME": "jane", "CLRT_CACHE_DIR": str(home / "cache"),
-           "AWS_SECRET_ACCESS_KEY": SECRET, "NVIDIA_API_KEY": SECRET}
-    return subprocess.run([sys.executable, "-P", "-m", "clrt", *arguments], cwd=home, capture_output=True, text=True,
-                          timeout=200, env={**os.environ, **own, **more})
+    own = {
+        "HOME": str(home),
+        "USER": "jane",
+        "LOGNAME": "jane",
+        "CLRT_CACHE_DIR": str(home / "cache"),
+        "AWS_SECRET_ACCESS_KEY": SECRET,
+        "NVIDIA_API_KEY": SECRET,
+    }
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "clrt", *arguments],
+        cwd=home,
+        capture_output=True,
+        text=True,
+        timeout=200,
+        env={**os.environ, **own, **more},
+    )
 
 
 @pytest.fixture
@@ -53,7 +65,7 @@ def test_the_pack_holds_all_of_it_and_no_names(home: Path) -> None:
     assert sorted(texts) == ["last-build.log", "last-error.log", "report.json", "report.txt"]
     report = json.loads(texts["report.json"])
     assert list(report) == PARTS and all(f"== {part}\n" in texts["report.txt"] for part in PARTS)
-    broken, = (driver for driver in report["drivers"] if "broken" in driver["library"])
+    (broken,) = (driver for driver in report["drivers"] if "broken" in driver["library"])
     assert broken["library"] == "~/libbroken.so" and "cannot be loaded" in broken["fault"]
     assert report["environment"]["OCL_ICD_VENDORS"] == "~/vendors"
     assert "no usable device matches 'no such device'" in texts["last-error.log"]
@@ -69,8 +81,9 @@ def test_the_report_is_printed_as_text_and_as_json(home: Path) -> None:
     assert text.returncode == printed.returncode == 0, text.stderr + printed.stderr
     report = json.loads(printed.stdout)
     assert list(report) == PARTS
-    assert [row["id"] for row in report["devices"]] and all(f"id: {row['id']}\n" in text.stdout
-                                                            for row in report["devices"])
+    assert [row["id"] for row in report["devices"]] and all(
+        f"id: {row['id']}\n" in text.stdout for row in report["devices"]
+    )
     assert not any("hardware" in row for row in report["devices"])
     assert report["versions"]["numpy"] in text.stdout and report["cache"]["writable"] is True
 
@@ -92,4 +105,5 @@ def test_words_that_only_contain_a_name_stay(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setenv("USER", "jan")
     monkeypatch.setenv("HOME", "/data/jan")
     assert without_names({"a": ["/data/jan/x", "/data/janet/x", "jan janitor", 7, None, True]}) == {
-        "a": ["~/x", "/data/janet/x", "~ janitor", 7, None, True]}
+        "a": ["~/x", "/data/janet/x", "~ janitor", 7, None, True]
+    }

@@ -35,8 +35,16 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 def outputs_in(folder: Path) -> Outputs:
     """Return the checked outputs of an image, in all formats."""
     folder.mkdir()
-    asked = Outputs((), tuple(folder / f"a{suffix}" for suffix in EXTENSIONS), ("depth",), True, "srgb", 0.0,
-                    folder / "r.json", None)
+    asked = Outputs(
+        (),
+        tuple(folder / f"a{suffix}" for suffix in EXTENSIONS),
+        ("depth",),
+        True,
+        "srgb",
+        0.0,
+        folder / "r.json",
+        None,
+    )
     asked.check()
     return asked
 
@@ -62,8 +70,9 @@ def test_each_result_is_kept_once(places: list[Path], tmp_path: Path, lost: int)
     assert all(str(path) in str(caught.value) for path in kept if path != by_ending[".depth.png"])
 
 
-def test_what_is_beside_already_is_not_kept_twice(places: list[Path], tmp_path: Path,
-                                                  monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_beside_already_is_not_kept_twice(
+    places: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked = outputs_in(tmp_path / "asked")
 
     def refuse(*arguments: object) -> None:

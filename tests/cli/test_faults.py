@@ -47,13 +47,24 @@ def folder(tmp_path: Path) -> Path:
 
 
 def render(folder: Path, *options: str, **more: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-P", "-m", "clrt", *RENDER, *options], cwd=folder, capture_output=True,
-                          text=True, timeout=60, env={**os.environ, **more})
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "clrt", *RENDER, *options],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        env={**os.environ, **more},
+    )
 
 
 def fault(library: Path, kind: str, queue: int = 0, after: int = 6) -> dict[str, str]:
-    return {"LD_PRELOAD": str(library), "FAULT": kind, "FAULT_QUEUE": str(queue), "FAULT_AFTER": str(after),
-            "CLRT_HANG_SECONDS": "1"}
+    return {
+        "LD_PRELOAD": str(library),
+        "FAULT": kind,
+        "FAULT_QUEUE": str(queue),
+        "FAULT_AFTER": str(after),
+        "CLRT_HANG_SECONDS": "1",
+    }
 
 
 def assert_same(folder: Path, whole: Path) -> None:
@@ -77,12 +88,19 @@ def test_of_two_devices_one_never_does_anything(folder: Path, whole: Path, fault
     assert_same(folder, whole)
 
 
-@pytest.mark.parametrize(("kind", "words", "devices"), [
-    ("lost", "the device failed", ONE), ("endless", "has not finished a launch in 1 s", ONE),
-    ("hangs", "has not returned from a call in 1 s", ONE), ("hangs", "has not returned from a call in 1 s", TWO),
-    ("crashes", "crashed (SIGABRT)", ONE)])
-def test_it_ends_in_a_message_and_goes_on(folder: Path, whole: Path, faulty: Path, kind: str, words: str,
-                                          devices: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    ("kind", "words", "devices"),
+    [
+        ("lost", "the device failed", ONE),
+        ("endless", "has not finished a launch in 1 s", ONE),
+        ("hangs", "has not returned from a call in 1 s", ONE),
+        ("hangs", "has not returned from a call in 1 s", TWO),
+        ("crashes", "crashed (SIGABRT)", ONE),
+    ],
+)
+def test_it_ends_in_a_message_and_goes_on(
+    folder: Path, whole: Path, faulty: Path, kind: str, words: str, devices: tuple[str, ...]
+) -> None:
     """If no device is left or a call does not return, the checkpoint stays valid and --resume finishes it."""
     result = render(folder, *devices, **fault(faulty, kind))
     assert result.returncode == 4 and words in result.stderr and "resume with --resume" in result.stderr, result.stderr
@@ -93,8 +111,12 @@ def test_it_ends_in_a_message_and_goes_on(folder: Path, whole: Path, faulty: Pat
 
 
 def test_who_watches_is_killed_and_so_is_who_renders(folder: Path) -> None:
-    process = subprocess.Popen([sys.executable, "-P", "-m", "clrt", *RENDER, "--time", "600"], cwd=folder,
-                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-m", "clrt", *RENDER, "--time", "600"],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     child = worker_of(process)
     process.kill()
     process.wait()
@@ -106,8 +128,13 @@ def test_who_watches_is_killed_and_so_is_who_renders(folder: Path) -> None:
 
 
 def test_ended_from_outside(folder: Path) -> None:
-    process = subprocess.Popen([sys.executable, "-P", "-m", "clrt", *RENDER, "--time", "600"], cwd=folder,
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-m", "clrt", *RENDER, "--time", "600"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     os.kill(worker_of(process), signal.SIGKILL)
     _, messages = process.communicate(timeout=60)
     assert process.returncode == 128 + signal.SIGKILL and "SIGKILL" in messages and "Traceback" not in messages

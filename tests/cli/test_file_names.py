@@ -21,24 +21,49 @@ from clrt.output.images import EXTENSIONS, metadata_of, read_image, write_image
 from .test_commands import SCENE
 
 NAME = os.fsdecode(b"sc\xe8ne")
-LOCALES = {"C": {"LC_ALL": "C"}, "ASCII": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
-           "UTF-8": {"LC_ALL": "C.UTF-8"}}
+LOCALES = {
+    "C": {"LC_ALL": "C"},
+    "ASCII": {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+    "UTF-8": {"LC_ALL": "C.UTF-8"},
+}
 MODEL = "mtllib \xe9.mtl\nusemtl \xe9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 SMALL = ("--size", "8x8", "--spp", "1", "-q")
 #: Calls, and the suffixes of the files that they write.
 CALLS: dict[str, tuple[tuple[str, ...], set[str]]] = {
-    "render": (("render", f"{NAME}.toml", *SMALL, "-o", f"{NAME}1.exr", "-o", f"{NAME}1.png", "-o", f"{NAME}1.hdr",
-                "--aov", "depth", "--report", f"{NAME}1.json", "--plot", f"{NAME}1.svg", "--checkpoint", f"{NAME}1.ck"),
-               {"1.exr", "1.png", "1.depth.png", "1.hdr", "1.json", "1.svg", "1.ck"}),
+    "render": (
+        (
+            "render",
+            f"{NAME}.toml",
+            *SMALL,
+            "-o",
+            f"{NAME}1.exr",
+            "-o",
+            f"{NAME}1.png",
+            "-o",
+            f"{NAME}1.hdr",
+            "--aov",
+            "depth",
+            "--report",
+            f"{NAME}1.json",
+            "--plot",
+            f"{NAME}1.svg",
+            "--checkpoint",
+            f"{NAME}1.ck",
+        ),
+        {"1.exr", "1.png", "1.depth.png", "1.hdr", "1.json", "1.svg", "1.ck"},
+    ),
     "by default": (("render", f"{NAME}.toml", *SMALL), {".png"}),
     "textured": (("render", f"{NAME}.obj", *SMALL, "-o", f"{NAME}2.png"), {"2.png"}),
     "frames": (("render", f"{NAME}.toml", *SMALL, "--turntable", "2", "-o", f"{NAME}_#.gif"), {"_#.gif"}),
-    "info": (("info", f"{NAME}.toml", "--json"), set()), "debug": (("debug", f"{NAME}.obj", "--pixel", "3,3", "--json"),
-                                                                   set()),
+    "info": (("info", f"{NAME}.toml", "--json"), set()),
+    "debug": (("debug", f"{NAME}.obj", "--pixel", "3,3", "--json"), set()),
     "convert": (("convert", "model.obj", f"{NAME}3.toml"), {"3.toml"}),
     "compare": (("compare", f"{NAME}.exr", f"{NAME}.exr", "--json"), set()),
-    "doctor": (("doctor", "-o", f"{NAME}4.json"), {"4.json"}), "devices": (("devices", "--json"), set()),
-    "cache": (("cache",), set()), "view": (("view", "--help"), set())}
+    "doctor": (("doctor", "-o", f"{NAME}4.json"), {"4.json"}),
+    "devices": (("devices", "--json"), set()),
+    "cache": (("cache",), set()),
+    "view": (("view", "--help"), set()),
+}
 
 
 @pytest.fixture
@@ -59,8 +84,12 @@ def folder(tmp_path: Path) -> Path:
 
 
 def clrt(*arguments: str, cwd: Path, **variables: str) -> subprocess.CompletedProcess[bytes]:
-    return subprocess.run([sys.executable, "-P", "-m", "clrt", *arguments], cwd=cwd, capture_output=True,
-                          env=os.environ | {"CLRT_CACHE_DIR": f"{cwd}/{NAME}.cache"} | variables)
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "clrt", *arguments],
+        cwd=cwd,
+        capture_output=True,
+        env=os.environ | {"CLRT_CACHE_DIR": f"{cwd}/{NAME}.cache"} | variables,
+    )
 
 
 def is_text(value: object) -> bool:
@@ -96,13 +125,22 @@ def test_models(folder: Path, suffix: str) -> None:
     import trimesh
 
     path = folder / f"{NAME}{suffix}"
-    path.write_bytes(trimesh.creation.box().export(file_type=suffix[1:]).encode()
-                     if suffix in (".obj", ".off") else trimesh.creation.box().export(file_type=suffix[1:]))
+    path.write_bytes(
+        trimesh.creation.box().export(file_type=suffix[1:]).encode()
+        if suffix in (".obj", ".off")
+        else trimesh.creation.box().export(file_type=suffix[1:])
+    )
     assert load(path).name == "sc\\xe8ne" and sum(len(mesh.faces) for mesh in load(path).meshes) == 12
 
 
-@pytest.mark.parametrize(("name", "locale"), [*((name, list(LOCALES)[number % 3]) for number, name in enumerate(CALLS)),
-                                              ("by default", "C"), ("by default", "UTF-8")])
+@pytest.mark.parametrize(
+    ("name", "locale"),
+    [
+        *((name, list(LOCALES)[number % 3]) for number, name in enumerate(CALLS)),
+        ("by default", "C"),
+        ("by default", "UTF-8"),
+    ],
+)
 def test_every_command(folder: Path, name: str, locale: str) -> None:
     """Files have exactly the given names; JSON is UTF-8."""
     arguments, endings = CALLS[name]
@@ -120,10 +158,24 @@ def test_every_command(folder: Path, name: str, locale: str) -> None:
         assert done.stdout == b"sc\xe8ne.png\n", "the name itself, for other programs"
 
 
-@pytest.mark.parametrize(("locale", "arguments"), [*zip(cycle(LOCALES), [
-    ("render", f"{NAME}0.toml"), ("render", f"{NAME}.toml", "-o", f"{NAME}.pgn"), ("info", f"{NAME}0.obj"),
-    ("convert", f"{NAME}.obj", f"{NAME}.toml"), ("compare", f"{NAME}0.exr", f"{NAME}.exr"), (f"{NAME}",),
-    ("debug", f"{NAME}0.toml", "--pixel", "1,1"), ("doctor", "-o", f"{NAME}.exe")])])
+@pytest.mark.parametrize(
+    ("locale", "arguments"),
+    [
+        *zip(
+            cycle(LOCALES),
+            [
+                ("render", f"{NAME}0.toml"),
+                ("render", f"{NAME}.toml", "-o", f"{NAME}.pgn"),
+                ("info", f"{NAME}0.obj"),
+                ("convert", f"{NAME}.obj", f"{NAME}.toml"),
+                ("compare", f"{NAME}0.exr", f"{NAME}.exr"),
+                (f"{NAME}",),
+                ("debug", f"{NAME}0.toml", "--pixel", "1,1"),
+                ("doctor", "-o", f"{NAME}.exe"),
+            ],
+        )
+    ],
+)
 def test_messages(folder: Path, locale: str, arguments: tuple[str, ...]) -> None:
     done = clrt(*arguments, cwd=folder, **LOCALES[locale])
     told = done.stderr.decode("ascii")

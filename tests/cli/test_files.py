@@ -27,10 +27,17 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("arguments", [
-    ("render", "ball.toml", "--report", "pipe.json"), ("render", "ball.toml", "--plot", "pipe.png"),
-    ("render", "ball.toml", "--checkpoint", "pipe.ck"), ("convert", "a.obj", "pipe.toml", "--force"),
-    ("doctor", "-o", "pipe.txt")], ids=" ".join)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("render", "ball.toml", "--report", "pipe.json"),
+        ("render", "ball.toml", "--plot", "pipe.png"),
+        ("render", "ball.toml", "--checkpoint", "pipe.ck"),
+        ("convert", "a.obj", "pipe.toml", "--force"),
+        ("doctor", "-o", "pipe.txt"),
+    ],
+    ids=" ".join,
+)
 def test_pipes_are_no_targets(folder: Path, arguments: tuple[str, ...]) -> None:
     pipe = folder / next(argument for argument in arguments if argument.startswith("pipe"))
     os.mkfifo(pipe)
@@ -71,8 +78,9 @@ def test_links_to_themselves_are_replaced(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(("refusals", "replaced"), [(2, True), (99, False)])
-def test_what_cannot_be_replaced_loses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch, refusals: int,
-                                               replaced: bool) -> None:
+def test_what_cannot_be_replaced_loses_nothing(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, refusals: int, replaced: bool
+) -> None:
     """Windows cannot replace a file that a program has open: after retries, the new file stays next to it."""
     path, system, refused = folder / "a.png", os.replace, list[Path]()
     path.write_text("old")
@@ -95,11 +103,23 @@ def test_what_cannot_be_replaced_loses_nothing(folder: Path, monkeypatch: pytest
     assert path.read_text() == ("new" if replaced else "old")
 
 
-@pytest.mark.parametrize("options", [
-    ("--report", "ball.toml"), ("--checkpoint", "ball.toml"), ("--checkpoint", "ball"), ("--report", "./ball.toml"),
-    ("--report", "w.exr"), ("--plot", "w.exr"), ("-o", "w.exr"), ("--report", "w.json", "--plot", "w.json"),
-    ("--reference", "r.exr", "--report", "r.exr"), ("--reference", "r.exr", "--plot", "r.exr"),
-    ("--turntable", "2", "--report", "w_####.exr")], ids=" ".join)
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--report", "ball.toml"),
+        ("--checkpoint", "ball.toml"),
+        ("--checkpoint", "ball"),
+        ("--report", "./ball.toml"),
+        ("--report", "w.exr"),
+        ("--plot", "w.exr"),
+        ("-o", "w.exr"),
+        ("--report", "w.json", "--plot", "w.json"),
+        ("--reference", "r.exr", "--report", "r.exr"),
+        ("--reference", "r.exr", "--plot", "r.exr"),
+        ("--turntable", "2", "--report", "w_####.exr"),
+    ],
+    ids=" ".join,
+)
 def test_no_file_is_named_twice(folder: Path, options: tuple[str, ...]) -> None:
     (folder / "r.exr").write_text("a reference")
     (folder / "ball").write_text("somebody's file")
@@ -115,18 +135,30 @@ def test_no_file_is_named_twice(folder: Path, options: tuple[str, ...]) -> None:
 MODEL = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 
 
-@pytest.mark.parametrize("arguments", [
-    ("a.obj",), ("a.obj", "-o", "b.png", "--report", "a.mtl"), ("ball.toml", "-o", "sky.hdr"),
-    ("ball.toml", "-o", "b.png", "--plot", "paint.png"), ("ball.toml", "--turntable", "2", "-o", "t_####.png"),
-    ("ball.toml", "-o", "b.png", "--checkpoint", "a.obj")], ids=" ".join)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("a.obj",),
+        ("a.obj", "-o", "b.png", "--report", "a.mtl"),
+        ("ball.toml", "-o", "sky.hdr"),
+        ("ball.toml", "-o", "b.png", "--plot", "paint.png"),
+        ("ball.toml", "--turntable", "2", "-o", "t_####.png"),
+        ("ball.toml", "-o", "b.png", "--checkpoint", "a.obj"),
+    ],
+    ids=" ".join,
+)
 def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ...]) -> None:
     """Scene files (models, .mtl, textures, maps) are checked before the render; a.obj's default output is a texture."""
     (folder / "a.obj").write_text(MODEL)
     (folder / "a.mtl").write_text("newmtl m\nmap_Kd a.png\n")
     textured = 'type = "diffuse"\ncolor = { image = "%s" }\n'
     (folder / "ball.toml").write_text(
-        '[environment]\nimage = "sky.hdr"\n[materials.a]\n' + textured % "paint.png" + "[materials.b]\n"
-        + textured % "t_0001.png" + '[[sphere]]\nmaterial = "a"\n[[mesh]]\nfile = "a.obj"\nmaterial = "b"\n')
+        '[environment]\nimage = "sky.hdr"\n[materials.a]\n'
+        + textured % "paint.png"
+        + "[materials.b]\n"
+        + textured % "t_0001.png"
+        + '[[sphere]]\nmaterial = "a"\n[[mesh]]\nfile = "a.obj"\nmaterial = "b"\n'
+    )
     for name in ("a.png", "paint.png", "t_0001.png", "sky.hdr"):
         write_image(folder / name, np.ones((4, 8, 3), np.float32))
     before = {path: path.read_bytes() for path in folder.iterdir()}

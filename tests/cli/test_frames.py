@@ -48,9 +48,15 @@ def render(*arguments: str) -> list[str]:
     return done.stdout.splitlines()
 
 
-@pytest.mark.parametrize(("name", "number", "expected"), [
-    ("a/x_####.png", 7, "a/x_0007.png"), ("#_##.exr", 123, "#_123.exr"), ("a#/x.png", 7, "a#/x_0007.png"),
-    ("x.y.png", 12345, "x.y_12345.png")])
+@pytest.mark.parametrize(
+    ("name", "number", "expected"),
+    [
+        ("a/x_####.png", 7, "a/x_0007.png"),
+        ("#_##.exr", 123, "#_123.exr"),
+        ("a#/x.png", 7, "a#/x_0007.png"),
+        ("x.y.png", 12345, "x.y_12345.png"),
+    ],
+)
 def test_names(name: str, number: int, expected: str) -> None:
     assert numbered(Path(name), number) == Path(expected)
 
@@ -131,8 +137,25 @@ def test_gifs_keep_time(tmp_path: Path) -> None:
 
 
 def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> None:
-    wanted = [sys.executable, "-m", "clrt", "render", "flight.toml", "--frames", "all", "--spp", "400", "--progress",
-              "json", "--size", "200x150", "-o", "f.gif", "-o", "####.png"]
+    wanted = [
+        sys.executable,
+        "-m",
+        "clrt",
+        "render",
+        "flight.toml",
+        "--frames",
+        "all",
+        "--spp",
+        "400",
+        "--progress",
+        "json",
+        "--size",
+        "200x150",
+        "-o",
+        "f.gif",
+        "-o",
+        "####.png",
+    ]
     running = subprocess.Popen(wanted, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     assert running.stderr is not None
     for line in running.stderr:
@@ -146,28 +169,37 @@ def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> 
     assert done.stdout.split() == ["0002.png", "0003.png", "0004.png", "0005.png", "f.gif"], done.stderr
 
 
-@pytest.mark.parametrize(("arguments", "code", "words"), [
-    (["--frames", "7-5"], 2, "'7-5' is not a list of frames"), (["--frames", "0-4:0"], 2, "0-99:5"),
-    (["--frames", "6"], 2, "flight has no frame 6; its frames are 0 to 5"),
-    (["--frames", "all", "--checkpoint", "c"], 2, "--checkpoint is not supported for animations"),
-    (["--fps", "3"], 2, "--turntable"), (["--turntable", "2", "-o", "a.gif", "--aov", "depth"], 2, "cannot store AOVs"),
-    (["--frames", "0", "-o", "a.mp4", "--size", "25x16"], 2, "26x16"), (["-o", "a.gif"], 6, ".gif"),
-    (["--frames", "0", "-o", "a.gif", "--fps", "60"], 2, "60 frames per second"),
-    (["--frames", "0", "-o", "a.gif", "--fps", "0.0015"], 2, "666.667 s are more than the 655.35"),
-    (["--turntable", "4", "-o", "a.gif", "--fps", "nan"], 2, "fps is nan; it must be above 0 and finite"),
-    (["--turntable", "4", "-o", "a.gif", "--fps", "inf"], 2, "fps is inf; it must be above 0 and finite"),
-    (["--frames", "all", "--fps", "nan"], 3, "animation.fps: nan is not a finite number"),
-    (["--frames", "all", "--fps", "1e12"], 3, "frames, more than 1000000; check the times"),
-    (["--frames", "0", "-o", "no/a.png"], 6, "does not exist")])
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["--frames", "7-5"], 2, "'7-5' is not a list of frames"),
+        (["--frames", "0-4:0"], 2, "0-99:5"),
+        (["--frames", "6"], 2, "flight has no frame 6; its frames are 0 to 5"),
+        (["--frames", "all", "--checkpoint", "c"], 2, "--checkpoint is not supported for animations"),
+        (["--fps", "3"], 2, "--turntable"),
+        (["--turntable", "2", "-o", "a.gif", "--aov", "depth"], 2, "cannot store AOVs"),
+        (["--frames", "0", "-o", "a.mp4", "--size", "25x16"], 2, "26x16"),
+        (["-o", "a.gif"], 6, ".gif"),
+        (["--frames", "0", "-o", "a.gif", "--fps", "60"], 2, "60 frames per second"),
+        (["--frames", "0", "-o", "a.gif", "--fps", "0.0015"], 2, "666.667 s are more than the 655.35"),
+        (["--turntable", "4", "-o", "a.gif", "--fps", "nan"], 2, "fps is nan; it must be above 0 and finite"),
+        (["--turntable", "4", "-o", "a.gif", "--fps", "inf"], 2, "fps is inf; it must be above 0 and finite"),
+        (["--frames", "all", "--fps", "nan"], 3, "animation.fps: nan is not a finite number"),
+        (["--frames", "all", "--fps", "1e12"], 3, "frames, more than 1000000; check the times"),
+        (["--frames", "0", "-o", "no/a.png"], 6, "does not exist"),
+    ],
+)
 def test_mistakes_end_in_one_message(arguments: list[str], code: int, words: str, flight: Path) -> None:
-    done = subprocess.run([sys.executable, "-m", "clrt", "render", "flight.toml", *arguments], capture_output=True,
-                          text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "clrt", "render", "flight.toml", *arguments], capture_output=True, text=True
+    )
     assert done.returncode == code and words in done.stderr and "Traceback" not in done.stderr
     assert not done.stdout and [path.name for path in Path().iterdir()] == ["flight.toml"]
 
 
 def test_what_does_not_move_has_no_frames(flight: Path) -> None:
     flight.write_text("sphere = [{}]\n")
-    done = subprocess.run([sys.executable, "-m", "clrt", "render", "flight.toml", "--frames", "all"],
-                          capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "clrt", "render", "flight.toml", "--frames", "all"], capture_output=True, text=True
+    )
     assert done.returncode == 3 and "flight: has no animation; write [[keyframe]]" in done.stderr

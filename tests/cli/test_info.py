@@ -36,10 +36,18 @@ material = "shell"
 """)
     lines = clrt("info", "a.toml", cwd=tmp_path).stdout.splitlines()
     assert [line.split(maxsplit=1)[1] for line in lines if line.startswith(("material ", "light "))] == [
-        '"shell": metallic_roughness, clearcoat, color (texture)', '"lamp": diffuse, emission', '"plain": diffuse',
-        "point: position 0 2 0, intensity 1 2 3", "environment: color 1 1 1, strength 0.5",
-        'sphere "bulb": radiance 3 2 1']
+        '"shell": metallic_roughness, clearcoat, color (texture)',
+        '"lamp": diffuse, emission',
+        '"plain": diffuse',
+        "point: position 0 2 0, intensity 1 2 3",
+        "environment: color 1 1 1, strength 0.5",
+        'sphere "bulb": radiance 3 2 1',
+    ]
     found = json.loads(clrt("info", "a.toml", "--json", cwd=tmp_path).stdout)
-    assert found["material_list"][0] == {"name": "shell", "type": "metallic_roughness", "set": ["clearcoat"],
-                                         "textured": ["color"]}
+    assert found["material_list"][0] == {
+        "name": "shell",
+        "type": "metallic_roughness",
+        "set": ["clearcoat"],
+        "textured": ["color"],
+    }
     assert found["light_list"][2] == {"type": "sphere", "name": "bulb", "radiance": [3, 2, 1]}

@@ -111,16 +111,24 @@ def _in_group(group: int, path: Path) -> Callable[..., os.stat_result]:
     return found
 
 
-@pytest.mark.parametrize(("name", "arguments"), [
-    ("a.png", ("render", "ball.toml", "-o", "a.png")),
-    ("a.raw.exr", ("render", "ball.toml", "-o", "a.exr", "--denoise")),
-    ("a.depth.png", ("render", "ball.toml", "-o", "a.png", "--aov", "depth")),
-    ("a.ck~", ("render", "ball.toml", "--checkpoint", "a.ck")), ("a.toml", ("convert", "a.obj", "a.toml")), *others(
-        ("a.json", ("render", "ball.toml", "--report", "a.json")),
-        ("p.png", ("render", "ball.toml", "--plot", "p.png")),
-        ("a.ck", ("render", "ball.toml", "--checkpoint", "a.ck")),
-        ("t_0001.png", ("render", "ball.toml", "--turntable", "2", "-o", "t.png")),
-        ("t.gif", ("render", "ball.toml", "--turntable", "2", "-o", "t.gif")), ("d.txt", ("doctor", "-o", "d.txt")))])
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("a.png", ("render", "ball.toml", "-o", "a.png")),
+        ("a.raw.exr", ("render", "ball.toml", "-o", "a.exr", "--denoise")),
+        ("a.depth.png", ("render", "ball.toml", "-o", "a.png", "--aov", "depth")),
+        ("a.ck~", ("render", "ball.toml", "--checkpoint", "a.ck")),
+        ("a.toml", ("convert", "a.obj", "a.toml")),
+        *others(
+            ("a.json", ("render", "ball.toml", "--report", "a.json")),
+            ("p.png", ("render", "ball.toml", "--plot", "p.png")),
+            ("a.ck", ("render", "ball.toml", "--checkpoint", "a.ck")),
+            ("t_0001.png", ("render", "ball.toml", "--turntable", "2", "-o", "t.png")),
+            ("t.gif", ("render", "ball.toml", "--turntable", "2", "-o", "t.gif")),
+            ("d.txt", ("doctor", "-o", "d.txt")),
+        ),
+    ],
+)
 def test_read_only_files(folder: Path, name: str, arguments: tuple[str, ...]) -> None:
     """Nothing is written, and the error names the file; with --force it is replaced and stays read-only."""
     (folder / name).touch()

@@ -16,13 +16,26 @@ from clrt.cli import bench_rays, commands, debug, info, render
 from clrt.errors import DeviceError
 from clrt.rendering.compile.choices import OFFSETS
 
-KNOWN: dict[str, Iterable[str]] = {"triangle": TRIANGLE_TESTS, "box": BOX_TESTS, "sphere": SPHERE_TESTS,
-                                   "offset": OFFSETS, "layout": TREES, "builder": BUILDER_NAMES}
+KNOWN: dict[str, Iterable[str]] = {
+    "triangle": TRIANGLE_TESTS,
+    "box": BOX_TESTS,
+    "sphere": SPHERE_TESTS,
+    "offset": OFFSETS,
+    "layout": TREES,
+    "builder": BUILDER_NAMES,
+}
 
 
-@pytest.mark.parametrize("command, names", [
-    (render.command, KNOWN), (info.command, KNOWN), (debug.command, KNOWN),
-    (bench_rays.rays_command, ["triangle", "box", "layout", "builder"])], ids=["render", "info", "debug", "bench rays"])
+@pytest.mark.parametrize(
+    "command, names",
+    [
+        (render.command, KNOWN),
+        (info.command, KNOWN),
+        (debug.command, KNOWN),
+        (bench_rays.rays_command, ["triangle", "box", "layout", "builder"]),
+    ],
+    ids=["render", "info", "debug", "bench rays"],
+)
 def test_options_offer_what_there_is(command: click.Command, names: Iterable[str]) -> None:
     options = {option.name: option.type for option in command.params}
     for name in names:
@@ -37,17 +50,22 @@ def test_what_is_chosen_is_compiled(tmp_path: Path) -> None:
     chosen = ["--triangle", "precomputed", "--box", "plain", "--sphere", "textbook", "--offset", "ulp", "--lanes", "1"]
     listed = CliRunner().invoke(info.command, [str(scene), "--json", *chosen], catch_exceptions=False)
     printed = CliRunner().invoke(render.command, [str(scene), "--print-kernel", "-q", *chosen], catch_exceptions=False)
-    logging.disable(logging.NOTSET)   # -q has switched it off
-    for file in ("geometry/triangle_precomputed.cl", "geometry/box_plain.cl", "geometry/sphere_textbook.cl",
-                 "offset/ulp.cl"):
+    logging.disable(logging.NOTSET)  # -q has switched it off
+    for file in (
+        "geometry/triangle_precomputed.cl",
+        "geometry/box_plain.cl",
+        "geometry/sphere_textbook.cl",
+        "offset/ulp.cl",
+    ):
         assert file in json.loads(listed.stdout)["files"] and f'"{file}"' in printed.stdout
 
 
 def test_info_is_of_the_device_that_would_render(tmp_path: Path) -> None:
     """With a device the builder is ploc, for which sah stands in without one; an unknown device is refused."""
     scene = tmp_path / "two.toml"
-    scene.write_text("[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]]\n"
-                     "faces = [[0, 1, 2], [1, 3, 2]]\n")
+    scene.write_text(
+        "[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]]\nfaces = [[0, 1, 2], [1, 3, 2]]\n"
+    )
     options = [str(scene), "--json", "--builder", "ploc", "--layout", "bvh2"]
     listed = CliRunner().invoke(info.command, options, catch_exceptions=False)
     assert json.loads(listed.stdout)["tree"]["builder"] == "ploc"

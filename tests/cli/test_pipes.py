@@ -65,10 +65,17 @@ def test_a_pipe_takes_one_image(folder: Path) -> None:
         split_pipes(map(Path, ("-", "exr:/dev/stdout")))
 
 
-@pytest.mark.parametrize(("form", "redirection"), [
-    ("png", "-o - | cat > got"), ("exr", "-o exr:- > got"), ("hdr", "-o hdr:/dev/stdout >> got"),
-    ("exr", "-o exr:fifo & cat fifo > got; wait $!"), ("png", "-o >(cat > got); sleep 0.2"),
-    ("png", "-o /dev/fd/1 -o other.exr --report other.json --denoise --progress json > got")])
+@pytest.mark.parametrize(
+    ("form", "redirection"),
+    [
+        ("png", "-o - | cat > got"),
+        ("exr", "-o exr:- > got"),
+        ("hdr", "-o hdr:/dev/stdout >> got"),
+        ("exr", "-o exr:fifo & cat fifo > got; wait $!"),
+        ("png", "-o >(cat > got); sleep 0.2"),
+        ("png", "-o /dev/fd/1 -o other.exr --report other.json --denoise --progress json > got"),
+    ],
+)
 def test_images(folder: Path, form: str, redirection: str) -> None:
     """The pipe gets the same image as a file, and nothing else."""
     options = "--denoise" if "--denoise" in redirection else ""
@@ -78,12 +85,22 @@ def test_images(folder: Path, form: str, redirection: str) -> None:
     got = Path("got").rename(f"got.{form}")
     assert np.array_equal(read_image(got), read_image(Path(f"file.{form}")))
     assert "other" not in redirection or {path.name for path in folder.glob("other*")} == {
-        "other.exr", "other.raw.exr", "other.json"}
+        "other.exr",
+        "other.raw.exr",
+        "other.json",
+    }
 
 
-@pytest.mark.parametrize(("options", "code", "told"), [
-    ("-o - --turntable 2", 2, "takes one image"), ("-o - -o exr:-", 2, "given twice"),
-    ("-o - --aov depth", 2, ".exr or .png"), ("-o tif:-", 6, "png, exr or hdr"), ("-o - >&-", 2, "is closed")])
+@pytest.mark.parametrize(
+    ("options", "code", "told"),
+    [
+        ("-o - --turntable 2", 2, "takes one image"),
+        ("-o - -o exr:-", 2, "given twice"),
+        ("-o - --aov depth", 2, ".exr or .png"),
+        ("-o tif:-", 6, "png, exr or hdr"),
+        ("-o - >&-", 2, "is closed"),
+    ],
+)
 def test_mistakes(folder: Path, options: str, code: int, told: str) -> None:
     done = shell(f"{CLRT} render ball.toml {options}")
     assert (done.returncode, done.stdout, done.stderr.count(b"\n")) == (code, b"", 1) and told.encode() in done.stderr
@@ -108,7 +125,7 @@ def test_a_reader_that_has_gone_loses_nothing(folder: Path, to: str) -> None:
     line = [*CLRT.split(), "render", "ball.toml", *SMALL.split(), "-q", "--checkpoint", "a.ck"]
     done = subprocess.run([*line, "-o", "exr:-"], stdout=writing, stderr=subprocess.PIPE, text=True)
     os.close(writing)
-    kept, = folder.glob("image-*.exr")
+    (kept,) = folder.glob("image-*.exr")
     assert done.returncode == 6 and done.stderr.count("\n") == 1 and done.stderr.startswith("error: -: cannot be ")
     assert str(kept) in done.stderr and "a.ck holds the samples so far" in done.stderr
     assert subprocess.run([*line, "-o", "b.exr", "--resume"]).returncode == 0
@@ -127,7 +144,7 @@ def test_ctrl_c_that_ends_the_reader_as_well(folder: Path) -> None:
     os.close(reading)
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
-    kept, = folder.glob("image-*.exr")
+    (kept,) = folder.glob("image-*.exr")
     assert process.returncode == 130 and read_image(kept).shape == (64, 96, 3)
-    error, = (each for each in told.splitlines() if not each.startswith("{"))
+    (error,) = (each for each in told.splitlines() if not each.startswith("{"))
     assert error.startswith("error: -: cannot be ") and str(kept) in error

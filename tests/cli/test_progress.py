@@ -22,8 +22,13 @@ STATE = {"phase", "spp", "seconds", "noise", "relmse", "samples_per_second", "se
 
 def render(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     (folder / "scene.toml").write_text(SCENE)
-    return subprocess.run([sys.executable, "-P", "-m", "clrt", "render", "scene.toml", *arguments], cwd=folder,
-                          capture_output=True, text=True, timeout=200)
+    return subprocess.run(
+        [sys.executable, "-P", "-m", "clrt", "render", "scene.toml", *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=200,
+    )
 
 
 def state(spp: int, seconds: float, noise: float | None = None) -> State:
@@ -52,12 +57,16 @@ def test_the_first_pace_is_the_mean_so_far() -> None:
     assert pace.rate == 200
 
 
-@pytest.mark.parametrize(("goal", "left"), [
-    (Goal(40, None, None), 15.0),            # ten pixels lack 30 samples each, at 20 per second
-    (Goal(None, 5.0, None), 2.0),
-    (Goal(40, 5.0, None), 2.0),
-    (Goal(None, None, 0.1), 15.0),           # half the noise takes four times the samples
-    (Goal(None, None, None), None)])
+@pytest.mark.parametrize(
+    ("goal", "left"),
+    [
+        (Goal(40, None, None), 15.0),  # ten pixels lack 30 samples each, at 20 per second
+        (Goal(None, 5.0, None), 2.0),
+        (Goal(40, 5.0, None), 2.0),
+        (Goal(None, None, 0.1), 15.0),  # half the noise takes four times the samples
+        (Goal(None, None, None), None),
+    ],
+)
 def test_the_time_left(goal: Goal, left: float | None) -> None:
     assert time_left(state(10, 3.0, noise=0.2), goal, 20.0) == (None if left is None else pytest.approx(left))
 
@@ -73,11 +82,15 @@ def test_json_progress_is_a_line_an_object(tmp_path: Path) -> None:
     assert all(each["samples_per_second"] > 0 and each["seconds_left"] >= 0 for each in states)
 
 
-@pytest.mark.parametrize(("options", "shown", "hidden"), [
-    (["-q"], [], ["loading", "device 0"]),
-    ([], ["loading the scene", "rendering", "4 spp", "writing"], ["device", "program of"]),
-    (["-v"], ["device ", "chosen as", "program of"], ["its files"]),
-    (["-vv"], ["device ", "its files: ", "integrator/path_segment.cl"], [])])
+@pytest.mark.parametrize(
+    ("options", "shown", "hidden"),
+    [
+        (["-q"], [], ["loading", "device 0"]),
+        ([], ["loading the scene", "rendering", "4 spp", "writing"], ["device", "program of"]),
+        (["-v"], ["device ", "chosen as", "program of"], ["its files"]),
+        (["-vv"], ["device ", "its files: ", "integrator/path_segment.cl"], []),
+    ],
+)
 def test_how_much_is_told(tmp_path: Path, options: list[str], shown: list[str], hidden: list[str]) -> None:
     result = render(tmp_path, "--progress", "plain", *options)
     assert (result.returncode, result.stdout) == (0, "scene.png\n"), result.stderr

@@ -34,12 +34,18 @@ def folder(tmp_path: Path) -> Path:
 
 def rendering(folder: Path, *options: str, **more: object) -> subprocess.Popen[str]:
     """Start a render and return once it has begun."""
-    process = subprocess.Popen([*RENDER, *options, "--progress", "json"], cwd=folder, text=True, stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE, **more)    # type: ignore[call-overload]
+    process = subprocess.Popen(
+        [*RENDER, *options, "--progress", "json"],
+        cwd=folder,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        **more,
+    )  # type: ignore[call-overload]
     assert process.stderr is not None
     while "spp" not in json.loads(process.stderr.readline()):
         pass
-    return process    # type: ignore[no-any-return]
+    return process  # type: ignore[no-any-return]
 
 
 @pytest.mark.parametrize("who", ["guard", "worker", "both"])

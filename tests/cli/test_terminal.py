@@ -43,7 +43,7 @@ class Terminal(io.StringIO):
             else:
                 assert character.isprintable()
                 line = self.lines[-1].ljust(self._column)
-                self.lines[-1] = line[:self._column] + character + line[self._column + 1:]
+                self.lines[-1] = line[: self._column] + character + line[self._column + 1 :]
                 if self._column + 1 < self.width:
                     self._column += 1
                     continue
@@ -95,11 +95,11 @@ def test_what_stays(width: int, redirected: bool, monkeypatch: pytest.MonkeyPatc
     with BarProgress() as progress:
         for name in ("load", "build", "compile"):
             progress.phase(name)
-        logging.lastResort.handle(logging.makeLogRecord({"msg": "a warning"}))    # type: ignore[union-attr]
+        logging.lastResort.handle(logging.makeLogRecord({"msg": "a warning"}))  # type: ignore[union-attr]
         progress.phase("render", "a device", 1 << 30)
         for spp in (1, 2, 4):
             progress.state(state(spp, 0.1 * spp, 0.5), Goal(4, None, None))
-            assert terminal.lines[-1].startswith("rendering"[:width - 1])
+            assert terminal.lines[-1].startswith("rendering"[: width - 1])
         progress.phase("write")
         print("a.png")
     kept = [line.rstrip() for line in terminal.lines]
@@ -108,11 +108,19 @@ def test_what_stays(width: int, redirected: bool, monkeypatch: pytest.MonkeyPatc
     assert kept[1] == fitted(["100 %", "4 spp", "noise 0.5000", "0.4 s", "0.00 Msamples/s"], width - 1)
 
 
-@pytest.mark.parametrize(("variables", "kind"), [
-    ({"TERM": "xterm-256color"}, BarProgress), ({"TERM": "linux", "NO_COLOR": "1"}, BarProgress),
-    ({"TERM": "xterm", "CI": "false"}, BarProgress), ({"TERM": "xterm", "CI": "true"}, PlainProgress),
-    ({"TERM": "dumb"}, PlainProgress), ({"TERM": "unknown"}, PlainProgress), ({"TERM": ""}, PlainProgress),
-    ({}, PlainProgress)])
+@pytest.mark.parametrize(
+    ("variables", "kind"),
+    [
+        ({"TERM": "xterm-256color"}, BarProgress),
+        ({"TERM": "linux", "NO_COLOR": "1"}, BarProgress),
+        ({"TERM": "xterm", "CI": "false"}, BarProgress),
+        ({"TERM": "xterm", "CI": "true"}, PlainProgress),
+        ({"TERM": "dumb"}, PlainProgress),
+        ({"TERM": "unknown"}, PlainProgress),
+        ({"TERM": ""}, PlainProgress),
+        ({}, PlainProgress),
+    ],
+)
 def test_who_gets_a_bar(variables: dict[str, str], kind: type, monkeypatch: pytest.MonkeyPatch) -> None:
     """A requested bar is shown on every terminal, but never elsewhere."""
     for name in ("TERM", "CI"):
@@ -125,8 +133,10 @@ def test_who_gets_a_bar(variables: dict[str, str], kind: type, monkeypatch: pyte
     assert type(make_progress(None, False)) is type(make_progress("bar", False)) is PlainProgress
 
 
-@pytest.mark.parametrize(("size", "variable", "found"), [
-    (40, "", 40), (40, "20", 20), (20, "40", 20), (0, "", 80), (0, "30", 30), (40, "0", 40), (40, "wide", 40)])
+@pytest.mark.parametrize(
+    ("size", "variable", "found"),
+    [(40, "", 40), (40, "20", 20), (20, "40", 20), (0, "", 80), (0, "30", 30), (40, "0", 40), (40, "wide", 40)],
+)
 def test_columns(size: int, variable: str, found: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The terminal's width or COLUMNS; a terminal without a size has 80."""
     ours, theirs = pty.openpty()
@@ -142,14 +152,20 @@ def on_terminal(folder: Path, width: int, *arguments: str, **variables: str) -> 
     """Return everything that a command sends to a terminal, which is also its standard output."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, width, 0, 0))
-    process = subprocess.Popen([sys.executable, "-P", "-m", "clrt", *arguments], cwd=folder, stdin=theirs,
-                               stdout=theirs, stderr=theirs, env=os.environ | {"TERM": "xterm-256color"} | variables)
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-m", "clrt", *arguments],
+        cwd=folder,
+        stdin=theirs,
+        stdout=theirs,
+        stderr=theirs,
+        env=os.environ | {"TERM": "xterm-256color"} | variables,
+    )
     os.close(theirs)
     sent = b""
     try:
         while piece := os.read(ours, 1 << 16):
             sent += piece
-    except OSError:     # end of file on Linux
+    except OSError:  # end of file on Linux
         pass
     os.close(ours)
     assert process.wait() == 0, sent
@@ -172,9 +188,20 @@ def test_plain_lines(tmp_path: Path) -> None:
     assert all(line.isprintable() for line in lines)
 
 
-@pytest.mark.parametrize("arguments", [
-    ("info", "scene.toml"), ("devices",), ("doctor",), ("cache",), ("debug", "scene.toml", "--pixel", "1,1"),
-    ("render", "scene.toml", "--progress", "json"), ("render", "--help"), ("bench", "--help")], ids=" ".join)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("info", "scene.toml"),
+        ("devices",),
+        ("doctor",),
+        ("cache",),
+        ("debug", "scene.toml", "--pixel", "1,1"),
+        ("render", "scene.toml", "--progress", "json"),
+        ("render", "--help"),
+        ("bench", "--help"),
+    ],
+    ids=" ".join,
+)
 def test_no_escape_sequences(tmp_path: Path, arguments: tuple[str, ...]) -> None:
     (tmp_path / "scene.toml").write_text(SCENE)
     sent = on_terminal(tmp_path, 40, *arguments, FORCE_COLOR="1", CLICOLOR_FORCE="1")

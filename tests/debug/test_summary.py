@@ -38,8 +38,14 @@ def square(height: float, name: str, material: Diffuse | Mirror = WHITE, turned:
 
 def above_floor(*meshes: Mesh, material: Diffuse | Mirror = WHITE, **parts: Any) -> Scene:
     """Return a floor that fills the image, seen from a low position, with the given meshes and parts."""
-    return replace(Scene(meshes=[square(0.0, "floor", material), *meshes], render=SETTINGS,
-                         camera=Camera(position=(0.0, 1.0, 2.0), look_at=(0.0, 0.0, 0.0), fov_degrees=20.0)), **parts)
+    return replace(
+        Scene(
+            meshes=[square(0.0, "floor", material), *meshes],
+            render=SETTINGS,
+            camera=Camera(position=(0.0, 1.0, 2.0), look_at=(0.0, 0.0, 0.0), fov_degrees=20.0),
+        ),
+        **parts,
+    )
 
 
 def explained(device: Device, scene: Scene, pixel: tuple[int, int] = (4, 4)) -> str:
@@ -51,24 +57,40 @@ ROOF, VEIL = square(2.0, "roof", BLACK), square(1.5, "veil", Diffuse(color=(0.0,
 LAMP = Diffuse(color=(0.0, 0.0, 0.0), emission=(5.0, 5.0, 5.0))
 REASONS: dict[str, tuple[Scene, str]] = {
     "no light": (above_floor(), "black: nothing in this scene emits light"),
-    "nothing there": (Scene(spheres=[Sphere(center=(0.0, 0.0, 99.0))], lights=[POINT], render=SETTINGS),
-                      "black: all 16 camera rays miss every object, and the scene has no environment"),
-    "roof": (above_floor(ROOF, lights=[POINT]),
-             'sees mesh "floor"; light samples there: all 16 shadowed (by mesh "roof")'),
+    "nothing there": (
+        Scene(spheres=[Sphere(center=(0.0, 0.0, 99.0))], lights=[POINT], render=SETTINGS),
+        "black: all 16 camera rays miss every object, and the scene has no environment",
+    ),
+    "roof": (
+        above_floor(ROOF, lights=[POINT]),
+        'sees mesh "floor"; light samples there: all 16 shadowed (by mesh "roof")',
+    ),
     "roof behind a veil": (above_floor(ROOF, VEIL, lights=[POINT]), 'there: all 16 shadowed (by mesh "roof")'),
-    "light below": (above_floor(lights=[replace(POINT, position=(0.0, -4.0, 0.0))]),
-                    "light samples there: all 16 behind the surface (light[0] (point))"),
-    "wound backwards": (above_floor(square(1.5, "lamp", LAMP)),
-                        "light samples there: all 16 in a direction without emission (mesh \"lamp\")"),
-    "seen from behind": (above_floor(material=LAMP, camera=Camera(position=(0.0, -3.0, 0.5))),
-                         'the camera sees mesh "floor", from behind; the emission of mesh "floor" faces away'),
-    "inside a ball": (above_floor(lights=[POINT], spheres=[Sphere(center=(0.0, 1.0, 2.0), radius=0.5, material=WHITE)]),
-                      'the camera sees sphere "sphere", from behind; light samples there: all 16 shadowed'),
-    "depth 1": (above_floor(lights=[POINT], render=replace(SETTINGS, max_depth=1)),
-                "the depth limit of 1 shows emission alone; paths: all 16 end at the depth limit"),
+    "light below": (
+        above_floor(lights=[replace(POINT, position=(0.0, -4.0, 0.0))]),
+        "light samples there: all 16 behind the surface (light[0] (point))",
+    ),
+    "wound backwards": (
+        above_floor(square(1.5, "lamp", LAMP)),
+        'light samples there: all 16 in a direction without emission (mesh "lamp")',
+    ),
+    "seen from behind": (
+        above_floor(material=LAMP, camera=Camera(position=(0.0, -3.0, 0.5))),
+        'the camera sees mesh "floor", from behind; the emission of mesh "floor" faces away',
+    ),
+    "inside a ball": (
+        above_floor(lights=[POINT], spheres=[Sphere(center=(0.0, 1.0, 2.0), radius=0.5, material=WHITE)]),
+        'the camera sees sphere "sphere", from behind; light samples there: all 16 shadowed',
+    ),
+    "depth 1": (
+        above_floor(lights=[POINT], render=replace(SETTINGS, max_depth=1)),
+        "the depth limit of 1 shows emission alone; paths: all 16 end at the depth limit",
+    ),
     "absorbed": (above_floor(material=BLACK, lights=[POINT]), "paths: all 16 are absorbed (by diffuse)"),
-    "mirror": (above_floor(material=Mirror(), lights=[POINT]),
-               "all 16 on a material that scatters nothing there (on mirror); paths: all 16 escape, but the scene "),
+    "mirror": (
+        above_floor(material=Mirror(), lights=[POINT]),
+        "all 16 on a material that scatters nothing there (on mirror); paths: all 16 escape, but the scene ",
+    ),
 }
 
 
@@ -137,9 +159,19 @@ def test_names_of_objects_and_lights(monkeypatch: pytest.MonkeyPatch) -> None:
     compiled = compile_scene(scene, Choices())
     names = SceneNames(scene, compiled)
     assert compiled.instances and [names.light(i) for i in range(int(compiled.counts["lights"][0]))] == [
-        'mesh "lamp"', 'sphere "sphere" (object 6)', "light[0] (point)", "light[3] (spot)", "light[1] (directional)",
-        "light[2] (directional)", "the environment"]
+        'mesh "lamp"',
+        'sphere "sphere" (object 6)',
+        "light[0] (point)",
+        "light[3] (spot)",
+        "light[1] (directional)",
+        "light[2] (directional)",
+        "the environment",
+    ]
     assert [names.object(i) for i in (0, 1, 3, 5)] == [
-        'mesh "mesh" (object 0)', 'mesh "lamp"', 'instance "instance" (object 3)', 'sphere "sphere" (object 5)']
+        'mesh "mesh" (object 0)',
+        'mesh "lamp"',
+        'instance "instance" (object 3)',
+        'sphere "sphere" (object 5)',
+    ]
     assert [names.material(i) for i in (1, 3, 5)] == ['"lamp" (diffuse)', "metallic_roughness", "mirror"]
     assert names.infinite == "the environment and the discs of directional lights"

@@ -48,10 +48,16 @@ def biased(scene: Scene) -> Scene:
 #: its variants, media included; many lights, in a light BVH; clamps; and scenes of the gallery.
 SUBJECTS: dict[str, Callable[[], Scene]] = {
     "biased": lambda: biased(planted(painted(everything()))),
-    "lamps": lambda: replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)])}
+    "lamps": lambda: replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)]),
+}
 PARTS_OF_SUBJECTS: dict[str, Callable[[], Scene]] = {
-    "shelf": shelf, "everything": everything, "painted": lambda: planted(painted(everything())),
-    "clamped": lambda: biased(everything()), "glass": gallery("glass"), "night": gallery("night")}
+    "shelf": shelf,
+    "everything": everything,
+    "painted": lambda: planted(painted(everything())),
+    "clamped": lambda: biased(everything()),
+    "glass": gallery("glass"),
+    "night": gallery("night"),
+}
 
 
 def pixels(seed: int, count: int) -> list[tuple[int, int]]:
@@ -72,8 +78,8 @@ def traced(request: pytest.FixtureRequest, device: Device) -> tuple[Doubles, lis
 
 
 def test_contributions_add_up_to_the_pixel(traced: tuple[Doubles, list[PixelPaths]]) -> None:
-    """To float rounding, unless it flipped a decision: of about 100 samples of 100 decisions each, one may be flipped.
-    """
+    """To float rounding, unless it flipped a decision: of about 100 samples of 100 decisions each, one may be
+    flipped."""
     mean, paths = traced
     assert any(each.value.any() for each in paths)
     differs = [np.abs(each.value - mean[each.pixel[::-1]]).max() > 1e-5 * (each.value.max() + 0.1) for each in paths]
@@ -81,8 +87,8 @@ def test_contributions_add_up_to_the_pixel(traced: tuple[Doubles, list[PixelPath
 
 
 def test_vertices_follow_from_each_other(traced: tuple[Doubles, list[PixelPaths]]) -> None:
-    """The next surface lies in the sampled direction; MIS weights and probabilities are in range, and sums consistent.
-    """
+    """The next surface lies in the sampled direction; MIS weights and probabilities are in range, and sums
+    consistent."""
     for paths in traced[1]:
         rows = {name: paths.rows[name].astype(np.float64) for name in paths.rows.dtype.names or ()}
         assert all(np.isfinite(rows[name]).all() for name in rows if name != "distance")
@@ -105,8 +111,9 @@ def test_light_samples_are_their_factors(device: Device) -> None:
     paths = trace_pixel(replace(scene, render=replace(scene.render, spp=64)), device, (20, 22))
     rows = paths.rows[paths.rows["sent"] != 0]
     factors = rows["throughput"] * rows["light_bsdf"] * rows["light_radiance"]
-    np.testing.assert_allclose(rows["unshadowed"], factors * (rows["light_weight"] / rows["light_pdf"])[:, None],
-                               rtol=1e-5)
+    np.testing.assert_allclose(
+        rows["unshadowed"], factors * (rows["light_weight"] / rows["light_pdf"])[:, None], rtol=1e-5
+    )
     assert len(rows) > 50 and len(np.unique(rows["light"])) > 3
 
 
@@ -127,8 +134,11 @@ def test_direct_light_ends_at_two_edges(device: Device) -> None:
 
 @pytest.mark.parametrize("pixel", [(45, 0), (0, 33), (-1, 0)])
 def test_pixels_outside_are_refused(device: Device, pixel: tuple[int, int]) -> None:
-    with pytest.raises(UsageError, match=rf"pixel {pixel[0]},{pixel[1]} is outside the image of 45x33; X must be "
-                                         "0 to 44 and Y 0 to 32"):
+    with pytest.raises(
+        UsageError,
+        match=rf"pixel {pixel[0]},{pixel[1]} is outside the image of 45x33; X must be "
+        "0 to 44 and Y 0 to 32",
+    ):
         trace_pixel(everything(), device, pixel)
 
 

@@ -12,10 +12,26 @@ from typing import Any
 from ..c_library import compile_library
 
 SOURCE = Path(__file__).with_name("fake_driver.c")
-DEFAULTS = {"PLATFORM": '"Fake"', "NAME": '"Fake GPU"', "UNITS": "100", "COUNT": "1", "TYPE": "4", "REVERSED": "0",
-            "UUIDS": "0", "REFUSED": "0", "ON_LOAD": "", "ON_UNLOAD": "", "ON_DEVICES": ""}
-FAULTS = {"aborts": {"ON_LOAD": "abort()"}, "hangs": {"ON_LOAD": "sleep(1000)"}, "empty": {"COUNT": "0"},
-          "segfaults": {"ON_DEVICES": "raise(SIGSEGV)"}, "refuses": {"TYPE": "2", "REFUSED": "0x103A"}}
+DEFAULTS = {
+    "PLATFORM": '"Fake"',
+    "NAME": '"Fake GPU"',
+    "UNITS": "100",
+    "COUNT": "1",
+    "TYPE": "4",
+    "REVERSED": "0",
+    "UUIDS": "0",
+    "REFUSED": "0",
+    "ON_LOAD": "",
+    "ON_UNLOAD": "",
+    "ON_DEVICES": "",
+}
+FAULTS = {
+    "aborts": {"ON_LOAD": "abort()"},
+    "hangs": {"ON_LOAD": "sleep(1000)"},
+    "empty": {"COUNT": "0"},
+    "segfaults": {"ON_DEVICES": "raise(SIGSEGV)"},
+    "refuses": {"TYPE": "2", "REFUSED": "0x103A"},
+}
 
 
 def make_driver(vendors: Path, name: str, **choices: str) -> Path:
@@ -31,14 +47,27 @@ def make_driver(vendors: Path, name: str, **choices: str) -> Path:
 def environment(folder: Path, **more: str) -> dict[str, str]:
     """Return an environment: drivers of folder/vendors and pip, cache in folder/cache, loaded drivers in folder/log."""
     kept = {name: value for name, value in os.environ.items() if name not in ("CLRT_DEVICE", "OCL_ICD_FILENAMES")}
-    return kept | {"OCL_ICD_VENDORS": str(folder / "vendors"), "CLRT_CACHE_DIR": str(folder / "cache"),
-                   "FAKE_LOG": str(folder / "log")} | more
+    return (
+        kept
+        | {
+            "OCL_ICD_VENDORS": str(folder / "vendors"),
+            "CLRT_CACHE_DIR": str(folder / "cache"),
+            "FAKE_LOG": str(folder / "log"),
+        }
+        | more
+    )
 
 
 def run(folder: Path, *command: str, **more: str) -> subprocess.CompletedProcess[str]:
     """Run Python with these arguments in that environment."""
-    return subprocess.run([sys.executable, "-P", *command], capture_output=True, text=True, cwd=folder, timeout=60,
-                          env=environment(folder, **more))
+    return subprocess.run(
+        [sys.executable, "-P", *command],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        timeout=60,
+        env=environment(folder, **more),
+    )
 
 
 def listed(folder: Path, **more: str) -> list[dict[str, Any]]:

@@ -72,6 +72,6 @@ def unowned(device: Any, array: Any, access: int) -> cl.Buffer:
 
 
 if __name__ == "__main__":
-    if "unsafe" in sys.argv:    # to see that it dies
+    if "unsafe" in sys.argv:  # to see that it dies
         setattr(device_arrays, "lend", unowned)
     main(int(sys.argv[1]))

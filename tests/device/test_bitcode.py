@@ -40,12 +40,16 @@ def multiplied(factor):
 device = open_device()
 print(json.dumps([multiplied(2), multiplied(3)]))
 """
-POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # installed by pip
+POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))  # installed by pip
 
 
 def places(folder: Path) -> dict[str, str]:
-    return surroundings(HOME=str(folder), CLRT_CACHE_DIR=str(folder / "cache"), POCL_CACHE_DIR=str(folder / "kept"),
-                        OCL_ICD_VENDORS=str(POCL))
+    return surroundings(
+        HOME=str(folder),
+        CLRT_CACHE_DIR=str(folder / "cache"),
+        POCL_CACHE_DIR=str(folder / "kept"),
+        OCL_ICD_VENDORS=str(POCL),
+    )
 
 
 def built(folder: Path) -> tuple[list[str], list[bool], list[list[float]]]:
@@ -90,8 +94,9 @@ def test_pictures_are_the_same_of_bitcode(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("flags", ["avx2 fma bmi1 bmi2 f16c movbe", "sse4_2 popcnt", ""])
-def test_machines_of_other_instructions_have_other_programs(device: Device, monkeypatch: pytest.MonkeyPatch,
-                                                            flags: str) -> None:
+def test_machines_of_other_instructions_have_other_programs(
+    device: Device, monkeypatch: pytest.MonkeyPatch, flags: str
+) -> None:
     """Applies even if processors have the same name, as under hypervisors, and share a cache."""
     here, same = program_key(device, ""), best_processor(set(flags.split())) == best_processor(processor_flags())
     monkeypatch.setattr(program, "processor_flags", lambda: frozenset(flags.split()))

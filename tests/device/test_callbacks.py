@@ -20,7 +20,7 @@ def test_one_that_is_under_way_is_expected(device: Device) -> None:
 
     def function() -> None:
         called.append(None)
-        sys.setprofile(lambda *_: time.sleep(0.02))     # lets other threads run at every call
+        sys.setprofile(lambda *_: time.sleep(0.02))  # lets other threads run at every call
 
     event = cl.UserEvent(device.context)
     event_callbacks.when_complete(event, function)

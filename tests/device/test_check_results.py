@@ -37,8 +37,9 @@ def info() -> DeviceInfo:
 
 def test_devices_have_hashes(info: DeviceInfo) -> None:
     """Hashes agree with equality, verdict and speed included."""
-    several = [replace(info, check=check, bench=bench) for check in (None, PASSED, FAILED)
-               for bench in (None, Speed(1, 2, 3))]
+    several = [
+        replace(info, check=check, bench=bench) for check in (None, PASSED, FAILED) for bench in (None, Speed(1, 2, 3))
+    ]
     copies = [copy.deepcopy(each) for each in several]
     assert {each: i for i, each in enumerate(several)} == {each: i for i, each in enumerate(copies)}
     assert len(set(several + copies)) == 6
@@ -66,16 +67,35 @@ def test_other_kernels_are_not_checked(info: DeviceInfo, changed: str, monkeypat
     assert kept_verdict(info) is None
 
 
-@pytest.mark.parametrize("content", [
-    b"", b"{", b"[]", b"null", b"\xff\xfe", b"[" * 100_000, b'{"verdict": 1}', "swapped", "no failures", "no figures",
-    "nested figures", "no time"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"{",
+        b"[]",
+        b"null",
+        b"\xff\xfe",
+        b"[" * 100_000,
+        b'{"verdict": 1}',
+        "swapped",
+        "no failures",
+        "no figures",
+        "nested figures",
+        "no time",
+    ],
+)
 def test_whatever_the_file_holds(info: DeviceInfo, folder: Path, content: bytes | str) -> None:
     keep_verdict(info, FAILED)
-    file, = folder.iterdir()
+    (file,) = folder.iterdir()
     if isinstance(content, str):
         kept = json.loads(file.read_bytes())
-        changes = {"swapped": {"passed": True}, "no failures": {"failures": 3}, "no figures": {"figures": None},
-                   "nested figures": {"figures": {"a": [1]}}, "no time": {"seconds": 10**400}}
+        changes = {
+            "swapped": {"passed": True},
+            "no failures": {"failures": 3},
+            "no figures": {"figures": None},
+            "nested figures": {"figures": {"a": [1]}},
+            "no time": {"seconds": 10**400},
+        }
         kept["verdict"] |= changes[content]
         content = json.dumps(kept).encode()
     file.write_bytes(content)

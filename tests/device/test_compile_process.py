@@ -35,14 +35,22 @@ SOURCE = "kernel void add_%d(global float *x) { x[get_global_id(0)] += %d; }"
 
 def test_beside_large_data_no_compiler_takes_memory(tmp_path: Path) -> None:
     """The compiler's 80 MB and more are used by the other process, and the next process finds the program cached."""
-    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # installed by pip
+    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))  # installed by pip
 
     def built(data_bytes: int, kept: str) -> tuple[int, bool, int]:
         folder = str(tmp_path / kept)
-        places = surroundings(HOME=str(tmp_path), CLRT_CACHE_DIR=folder, POCL_CACHE_DIR=folder,
-                              OCL_ICD_VENDORS=str(pocl))
-        done = subprocess.run([sys.executable, "-c", BUILD, str(data_bytes)], cwd=tmp_path, env=places, timeout=200,
-                              capture_output=True, text=True, check=True)
+        places = surroundings(
+            HOME=str(tmp_path), CLRT_CACHE_DIR=folder, POCL_CACHE_DIR=folder, OCL_ICD_VENDORS=str(pocl)
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", BUILD, str(data_bytes)],
+            cwd=tmp_path,
+            env=places,
+            timeout=200,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
         peak, cached, kernels = json.loads(done.stdout)
         return peak, cached, kernels
 
@@ -60,8 +68,9 @@ def test_programs_are_refused_as_ever(device: Device) -> None:
 
 
 @pytest.mark.parametrize("number, python, seconds", [(1, "/no/such/python", 60.0), (2, sys.executable, 0.0)])
-def test_without_the_other_process_programs_are_compiled_here(device: Device, monkeypatch: pytest.MonkeyPatch,
-                                                              number: int, python: str, seconds: float) -> None:
+def test_without_the_other_process_programs_are_compiled_here(
+    device: Device, monkeypatch: pytest.MonkeyPatch, number: int, python: str, seconds: float
+) -> None:
     """Compiles in this process if the other cannot be started or times out."""
     source = SOURCE % (number, number)
     monkeypatch.setattr(sys, "executable", python)

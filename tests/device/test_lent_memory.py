@@ -106,7 +106,8 @@ USES: dict[str, Callable[[Device], Callable[[], object]]] = {
     "all_hits": lambda device: partial(query(device).all_hits, *RAYS),
     "renderer": lambda device: partial(list, renderer(device).passes()),
     "two devices": lambda device: partial(list, renderer(device, 2).passes()),
-    "first hits": first_hits}
+    "first hits": first_hits,
+}
 
 
 def interrupted(use: Callable[[], object], gate: Gate, line: int) -> None:
@@ -117,7 +118,7 @@ def interrupted(use: Callable[[], object], gate: Gate, line: int) -> None:
         nonlocal passed
         passed += gate.launched and event == "line"
         if passed > line:
-            passed = -10**9
+            passed = -(10**9)
             raise KeyboardInterrupt
         return trace if "/clrt/" in frame.f_code.co_filename else None
 
@@ -136,7 +137,7 @@ def test_interrupted_at_any_line(device: Device, gate: Gate, name: str) -> None:
     """After an interrupt, every array that a launch may use survives until it ends, and is then freed."""
     if device.info.type != "cpu":
         pytest.skip("arrays are lent to CPUs alone")
-    USES[name](device)()    # build its programs first
+    USES[name](device)()  # build its programs first
     for line in RNG.permutation(LINES)[:12]:
         gate.launched, gate.lent = False, []
         use = USES[name](device)
@@ -195,7 +196,12 @@ def test_process_lives(device: Device, how: str) -> None:
 
 def test_nothing_uses_memory_that_was_freed(device: Device) -> None:
     """Each array of 4 KiB or more is unmapped when it is freed, so a command that still uses it crashes."""
-    unmapped = {"MALLOC_MMAP_THRESHOLD_": "4096", "MALLOC_TOP_PAD_": "0"}    # glibc's
-    done = subprocess.run([sys.executable, "-m", "tests.device.left_renders", str(device.info.index)], text=True,
-                          capture_output=True, env=os.environ | unmapped, cwd=Path(__file__).parents[2])
+    unmapped = {"MALLOC_MMAP_THRESHOLD_": "4096", "MALLOC_TOP_PAD_": "0"}  # glibc's
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.device.left_renders", str(device.info.index)],
+        text=True,
+        capture_output=True,
+        env=os.environ | unmapped,
+        cwd=Path(__file__).parents[2],
+    )
     assert (done.returncode, done.stdout) == (0, "all left\n"), done.stderr

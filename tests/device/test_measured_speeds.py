@@ -38,7 +38,7 @@ def test_a_speed_comes_back(info: DeviceInfo, monkeypatch: pytest.MonkeyPatch) -
 def test_whatever_the_file_holds(info: DeviceInfo, tmp_path: Path, bench: object) -> None:
     """Replaces all of the figures or one of them by a malformed value."""
     keep_speed(info, SPEED)
-    file, = tmp_path.glob("*.bench.json")
+    (file,) = tmp_path.glob("*.bench.json")
     kept = json.loads(file.read_bytes())
     one = isinstance(bench, float | str)
     file.write_text(json.dumps(kept | {"bench": kept["bench"] | {"mrays_bounce": bench} if one else bench}))

@@ -23,9 +23,13 @@ GARBAGE = bytes(range(256)) * 4
 def test_a_damaged_program_is_compiled_again(tmp_path: Path, name: str, size: int) -> None:
     """Some damage is noticed at once; if PoCL aborts on it, the error says so and the damaged files are removed."""
     (tmp_path / "scene.toml").write_text(SCENE)
-    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # installed by pip
-    places = surroundings(HOME=str(tmp_path), CLRT_CACHE_DIR=str(tmp_path / "cache"), OCL_ICD_VENDORS=str(pocl),
-                          POCL_CACHE_DIR=str(tmp_path / "kept"))
+    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))  # installed by pip
+    places = surroundings(
+        HOME=str(tmp_path),
+        CLRT_CACHE_DIR=str(tmp_path / "cache"),
+        OCL_ICD_VENDORS=str(pocl),
+        POCL_CACHE_DIR=str(tmp_path / "kept"),
+    )
 
     def rendered(picture: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run([*RENDER, picture], cwd=tmp_path, env=places, capture_output=True, text=True, timeout=200)
@@ -36,8 +40,9 @@ def test_a_damaged_program_is_compiled_again(tmp_path: Path, name: str, size: in
     for file in files:
         file.write_bytes(GARBAGE[:size])
     first = rendered("first.exr")
-    assert first.returncode == 0 or (first.returncode == 4 and f"because {len(files)} of the programs that PoCL "
-                                     "caches" in first.stderr), first.stderr
+    assert first.returncode == 0 or (
+        first.returncode == 4 and f"because {len(files)} of the programs that PoCL caches" in first.stderr
+    ), first.stderr
     assert rendered("second.exr").returncode == 0
     assert np.array_equal(read_image(tmp_path / "second.exr"), read_image(tmp_path / "whole.exr"))
 

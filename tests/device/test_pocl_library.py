@@ -22,11 +22,15 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, bytes]:
     folder = tmp_path_factory.mktemp("library")
     (folder / "scene.toml").write_text(SCENE + TRIANGLE)
     pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))
-    places = surroundings(HOME=str(folder), CLRT_CACHE_DIR=str(folder / "cache"), OCL_ICD_VENDORS=str(pocl),
-                          POCL_CACHE_DIR=str(folder / "kept"))
+    places = surroundings(
+        HOME=str(folder),
+        CLRT_CACHE_DIR=str(folder / "cache"),
+        OCL_ICD_VENDORS=str(pocl),
+        POCL_CACHE_DIR=str(folder / "kept"),
+    )
     done = subprocess.run([*RENDER, "picture.png"], cwd=folder, env=places, capture_output=True, text=True, timeout=200)
     assert done.returncode == 0, done.stderr
-    kernel, = (folder / "kept").rglob("wave*.so")
+    (kernel,) = (folder / "kept").rglob("wave*.so")
     return done.stderr, kernel.read_bytes()
 
 

@@ -101,13 +101,17 @@ def test_a_kernel_file_opens_with_what_it_is() -> None:
 def used_without_scenes(device: Device) -> set[str]:
     """Return the files of ray queries, builders, refits and device checks."""
     corners = np.zeros((3, 3), np.float32)
-    sources = [turns_source(), *(refit.program_source(layout) for layout in refit.RECIPES),
-               *(kernel_calls.source(file, device.lanes) for file in kernel_calls.FILES),
-               *(compose("", entry, {}) for entry in ("check/turns.cl", "core/fma.cl")),
-               *(program_source(shape, True, True, True) for shape in SHAPES.values())]
+    sources = [
+        turns_source(),
+        *(refit.program_source(layout) for layout in refit.RECIPES),
+        *(kernel_calls.source(file, device.lanes) for file in kernel_calls.FILES),
+        *(compose("", entry, {}) for entry in ("check/turns.cl", "core/fma.cl")),
+        *(program_source(shape, True, True, True) for shape in SHAPES.values()),
+    ]
     for layout, traversal in (("bvh8", "pool"), ("bvh8", "packet"), ("bvh2", "single")):
-        query = clrt.InstancedRayQuery([(corners, [[0, 1, 2]])], [0], [np.eye(3, 4)], device=device.info.index,
-                                       layout=layout)
+        query = clrt.InstancedRayQuery(
+            [(corners, [[0, 1, 2]])], [0], [np.eye(3, 4)], device=device.info.index, layout=layout
+        )
         sources.append(query.source("closest_hit", traversal))
     return {name for source in sources for name in files_of(source)}
 
@@ -135,28 +139,42 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     for scene in (painted(everything()), planted(everything()), shelf(), *(sight for _, sight in sights(everything()))):
         used |= set(compile_scene(scene, Choices()).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
-    for entry in ("aov/denoiser_guides.cl", "integrator/debug.cl", "raster/outline.cl", "bench/probe.cl",
-                  "bench/raster_hits.cl"):
+    for entry in (
+        "aov/denoiser_guides.cl",
+        "integrator/debug.cl",
+        "raster/outline.cl",
+        "bench/probe.cl",
+        "bench/raster_hits.cl",
+    ):
         used |= set(compile_scene(everything(), Choices(), entry).files)
-    for name, file in (("MIS_WEIGHTS", "bsdf_sampling"), ("MIS_WEIGHTS", "light_sampling"),
-                       ("LIGHT_CHOICE", "uniform_choice")):
+    for name, file in (
+        ("MIS_WEIGHTS", "bsdf_sampling"),
+        ("MIS_WEIGHTS", "light_sampling"),
+        ("LIGHT_CHOICE", "uniform_choice"),
+    ):
         compiled = compile_scene(everything(), Choices())
         used |= set(replace(compiled, chosen_files=compiled.chosen_files | {name: [f"bench/{file}.cl"]}).files)
     assert sorted(used) == FILES
 
 
-@pytest.mark.parametrize("entry", ["the picture's",
-                                   *others("aov/denoiser_guides.cl", "first hits", "integrator/debug.cl")])
-def test_programs_build_without_a_warning(device: Device, entry: str, capfd: pytest.CaptureFixture[str],
-                                          tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "entry", ["the picture's", *others("aov/denoiser_guides.cl", "first hits", "integrator/debug.cl")]
+)
+def test_programs_build_without_a_warning(
+    device: Device, entry: str, capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Warnings would interrupt the progress bar on the terminal. Other messages of drivers are ignored."""
     scene = everything()
-    scene.spheres = scene.spheres + [type(scene.spheres[0])(material=material)
-                                     for kind in MATERIALS for material in variants(kind)]
+    scene.spheres = scene.spheres + [
+        type(scene.spheres[0])(material=material) for kind in MATERIALS for material in variants(kind)
+    ]
     compiled = compile_scene(scene, Choices(device.lanes, device.layout, direct_light=True))
-    sources = {"the picture's": compiled.source, "aov/denoiser_guides.cl": compiled.source_of("aov/denoiser_guides.cl"),
-               "first hits": first_hit_program(compiled, AOVS)[0],
-               "integrator/debug.cl": compiled.source_of("integrator/debug.cl", vertex_preamble())}
+    sources = {
+        "the picture's": compiled.source,
+        "aov/denoiser_guides.cl": compiled.source_of("aov/denoiser_guides.cl"),
+        "first hits": first_hit_program(compiled, AOVS)[0],
+        "integrator/debug.cl": compiled.source_of("integrator/debug.cl", vertex_preamble()),
+    }
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
     build(device, f"{sources[entry]}\n// its own text, so that no cache has it")
     log = cache_files.kept_logs()["build"]
@@ -169,10 +187,12 @@ def test_compiler_errors_are_told(device: Device) -> None:
         build(device, "kernel void broken() { undeclared = 1; }")
 
 
-@pytest.mark.parametrize("state", ["absent", "stored", "corrupt", "truncated", "empty", "no folder", "not a binary",
-                                   "a folder in its place"])
-def test_a_program_is_built_whatever_the_cache_holds(device: Device, state: str, tmp_path: Path,
-                                                     monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "state", ["absent", "stored", "corrupt", "truncated", "empty", "no folder", "not a binary", "a folder in its place"]
+)
+def test_a_program_is_built_whatever_the_cache_holds(
+    device: Device, state: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = tmp_path / "cache"
     monkeypatch.setenv("CLRT_CACHE_DIR", str(folder))
     source = f"{DOUBLE} // {state}"
@@ -237,8 +257,12 @@ print(query.any_hit([0.2, 0.2, 1], [0, 0, -1]))
 def test_what_pyopencl_keeps_is_damaged(device: Device, tmp_path: Path) -> None:
     """A damaged cache of pyopencl is ignored silently."""
     for damaged in (False, True):
-        done = subprocess.run([sys.executable, "-c", KEPT_CALLS, str(device.info.index)], capture_output=True,
-                              text=True, env=os.environ | {"XDG_CACHE_HOME": str(tmp_path)})
+        done = subprocess.run(
+            [sys.executable, "-c", KEPT_CALLS, str(device.info.index)],
+            capture_output=True,
+            text=True,
+            env=os.environ | {"XDG_CACHE_HOME": str(tmp_path)},
+        )
         assert (done.returncode, done.stdout, done.stderr) == (0, "[ True]\n", ""), damaged
         kept = list(tmp_path.glob("pytools/*.sqlite"))
         assert kept

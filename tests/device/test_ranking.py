@@ -47,13 +47,18 @@ def test_two_equal_gpus(tmp_path: Path, uuids: str) -> None:
     if uuids == "1":
         assert ids[0] == ids[1]
         assert {row["compute_units"]: row["hardware"] for row in rows} == {
-            100: ["UUID ab" + 30 * "0", "PCI 0000:65:00.0"], 99: ["UUID ab01" + 28 * "0", "PCI 0000:66:00.0"]}
+            100: ["UUID ab" + 30 * "0", "PCI 0000:65:00.0"],
+            99: ["UUID ab01" + 28 * "0", "PCI 0000:66:00.0"],
+        }
 
 
 def test_a_device_through_two_platforms(tmp_path: Path) -> None:
     """Equal hardware is recognized by UUID, or else by name; a translation layer ranks after the native driver."""
-    for name, choices in {"alayer": {"PLATFORM": '"clvk"', "UUIDS": "1"}, "driver": {"UUIDS": "1"},
-                          "unlike": {"NAME": '"Other GPU"', "UNITS": "50"}}.items():
+    for name, choices in {
+        "alayer": {"PLATFORM": '"clvk"', "UUIDS": "1"},
+        "driver": {"UUIDS": "1"},
+        "unlike": {"NAME": '"Other GPU"', "UNITS": "50"},
+    }.items():
         make_driver(tmp_path / "vendors", name, **choices)
     first, second, third = [row for row in listed(tmp_path) if row["type"] == "gpu"]
     assert (first["platform"], first["chosen"]) == ("driver", True) and "chosen as the largest gpu" in first["why"]

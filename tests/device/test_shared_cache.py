@@ -24,7 +24,7 @@ pytestmark = pytest.mark.processes
 
 SCENE = "[render]\nsize = [16, 8]\nspp = 2\n[environment]\ncolor = [1, 1, 1]\n[[sphere]]\n"
 RENDER = (sys.executable, "-P", "-m", "clrt", "render", "scene.toml", "-q", "-o")
-DROP_CAPABILITY, CAPABILITIES = 24, 64     # of prctl(2)
+DROP_CAPABILITY, CAPABILITIES = 24, 64  # of prctl(2)
 
 
 def surroundings(**more: str) -> dict[str, str]:
@@ -42,8 +42,10 @@ def no_rights() -> None:
 def test_eight_processes_start_on_a_cold_cache(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(SCENE)
     places = surroundings(HOME=str(tmp_path), CLRT_CACHE_DIR=str(tmp_path / "cache"))
-    started = [subprocess.Popen([*RENDER, f"{number}.exr"], cwd=tmp_path, env=places, stderr=subprocess.PIPE)
-               for number in range(8)]
+    started = [
+        subprocess.Popen([*RENDER, f"{number}.exr"], cwd=tmp_path, env=places, stderr=subprocess.PIPE)
+        for number in range(8)
+    ]
     told = [process.communicate(timeout=200)[1] for process in started]
     assert [process.returncode for process in started] == [0] * 8, told
     pictures = [read_image(tmp_path / f"{number}.exr") for number in range(8)]
@@ -51,18 +53,29 @@ def test_eight_processes_start_on_a_cold_cache(tmp_path: Path) -> None:
     assert not list((tmp_path / "cache").glob("unfinished-*"))
 
 
-@pytest.mark.parametrize("home", ["a read-only home", "no home", "a home that cannot be told",
-                                  "a cache of PoCL's that is read-only"])
+@pytest.mark.parametrize(
+    "home", ["a read-only home", "no home", "a home that cannot be told", "a cache of PoCL's that is read-only"]
+)
 def test_whatever_the_home_is(tmp_path: Path, home: str) -> None:
     """The image is written, and nothing is written into a folder named ~."""
     (tmp_path / "scene.toml").write_text(SCENE)
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o555)
-    places = {"a read-only home": {"HOME": str(closed), "CLRT_CACHE_DIR": str(closed / "clrt")},
-              "no home": {}, "a home that cannot be told": {"HOME": "~"},
-              "a cache of PoCL's that is read-only": {"HOME": str(tmp_path), "POCL_CACHE_DIR": str(closed)}}[home]
-    result = subprocess.run([*RENDER, "picture.png"], cwd=tmp_path, env=surroundings(TMPDIR=str(tmp_path), **places),
-                            capture_output=True, text=True, timeout=100, preexec_fn=no_rights)
+    places = {
+        "a read-only home": {"HOME": str(closed), "CLRT_CACHE_DIR": str(closed / "clrt")},
+        "no home": {},
+        "a home that cannot be told": {"HOME": "~"},
+        "a cache of PoCL's that is read-only": {"HOME": str(tmp_path), "POCL_CACHE_DIR": str(closed)},
+    }[home]
+    result = subprocess.run(
+        [*RENDER, "picture.png"],
+        cwd=tmp_path,
+        env=surroundings(TMPDIR=str(tmp_path), **places),
+        capture_output=True,
+        text=True,
+        timeout=100,
+        preexec_fn=no_rights,
+    )
     assert (result.returncode, result.stdout) == (0, "picture.png\n"), result.stderr
     assert not (tmp_path / "~").exists() and not list(closed.iterdir())
 
@@ -71,9 +84,14 @@ def test_whatever_the_home_is(tmp_path: Path, home: str) -> None:
 def test_where_no_file_can_be_written_the_cause_is_named(tmp_path: Path, most: int) -> None:
     """By every limit, whatever the driver does: it does not load, cannot build, or aborts."""
     (tmp_path / "scene.toml").write_text(SCENE)
-    done = subprocess.run([*RENDER, "-"], cwd=tmp_path, env=surroundings(HOME=str(tmp_path), TMPDIR=str(tmp_path)),
-                          capture_output=True, timeout=300,
-                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
+    done = subprocess.run(
+        [*RENDER, "-"],
+        cwd=tmp_path,
+        env=surroundings(HOME=str(tmp_path), TMPDIR=str(tmp_path)),
+        capture_output=True,
+        timeout=300,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
+    )
     told = done.stderr.decode()
     assert done.returncode in (4, 5) and f"no file of {ROOM >> 10} kB can be written in" in told, told
     assert "Traceback" not in told
@@ -99,8 +117,13 @@ def test_memory_is_taken_where_the_temporary_folder_is_full(tmp_path: Path, monk
 
 def test_the_cause_is_not_named_where_there_is_room(tmp_path: Path) -> None:
     code = "from clrt.device.discovery.driver_caches import no_room; print(repr(no_room()))"
-    done = subprocess.run([sys.executable, "-c", code], env=surroundings(TMPDIR=str(tmp_path), HOME="/nonexistent"),
-                          capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=surroundings(TMPDIR=str(tmp_path), HOME="/nonexistent"),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert done.stdout == "''\n"
 
 
@@ -110,8 +133,13 @@ def test_a_folder_without_room_is_not_taken(tmp_path: Path, missing: int) -> Non
     code = f"from clrt.device.discovery.driver_caches import _writable; print(_writable({str(tmp_path)!r}))"
     places = surroundings(TMPDIR=str(tmp_path), HOME=str(tmp_path))
     most = ROOM - missing
-    done = subprocess.run([sys.executable, "-c", code], env=places, capture_output=True, text=True,
-                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=places,
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
+    )
     assert (done.returncode, done.stdout) == (0, f"{not missing}\n"), done.stderr
 
 
@@ -141,8 +169,15 @@ def test_what_cannot_be_kept_leaves_nothing(tmp_path: Path, monkeypatch: pytest.
 
 def test_everything_that_is_kept_is_of_a_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path / "cache"))
-    names = ["0a.bin", "1.check.json", "1.bench.json", "2.driver.json", "1.loops.json", "reference-7.npz",
-             "unfinished-1"]
+    names = [
+        "0a.bin",
+        "1.check.json",
+        "1.bench.json",
+        "2.driver.json",
+        "1.loops.json",
+        "reference-7.npz",
+        "unfinished-1",
+    ]
     for name in names:
         assert cache.write_file(name, b"1234")
     cache.keep_log("build", "all is well")

@@ -17,10 +17,14 @@ from clrt.rendering.compile import records
 from clrt.scene.materials.material_types import MATERIALS
 
 RECORDS: dict[str, np.dtype[Any]] = {
-    f"{module.__name__.rsplit('.', 1)[1]}_{name}": value for module in (records, layouts, cwbvh, triangle_forms)
-    for name, value in vars(module).items() if isinstance(value, np.dtype) and value.names
-} | {f"material_{kind.__name__}": records.parameter_record(material.parameters() for material in variants(kind))
-     for kind in MATERIALS}
+    f"{module.__name__.rsplit('.', 1)[1]}_{name}": value
+    for module in (records, layouts, cwbvh, triangle_forms)
+    for name, value in vars(module).items()
+    if isinstance(value, np.dtype) and value.names
+} | {
+    f"material_{kind.__name__}": records.parameter_record(material.parameters() for material in variants(kind))
+    for kind in MATERIALS
+}
 
 
 def offsets(dtype: np.dtype[Any]) -> list[int]:
@@ -38,8 +42,10 @@ def test_device_agrees_with_numpy(device: Device) -> None:
     for name, dtype in RECORDS.items():
         texts.append(c_typedef(name, dtype))
         places.append(f"sizeof({name})")
-        places += [f"(uint)((global char *)&(({name} global *)base)->{field} - (global char *)base)"
-                   for field in dtype.names or ()]
+        places += [
+            f"(uint)((global char *)&(({name} global *)base)->{field} - (global char *)base)"
+            for field in dtype.names or ()
+        ]
     writes = "".join(f"out[{i}] = {place};" for i, place in enumerate(places))
     source = "\n".join([*texts, f"kernel void sizes(global uint *base, global uint *out) {{ {writes} }}"])
     kernel = make_kernel(device, build(device, source), "sizes")
@@ -75,8 +81,10 @@ def test_records_keep_the_rules(name: str) -> None:
 
 def test_typedef() -> None:
     dtype = record(center="3f4", radius="f4", box="(2,3)f4", index="i4", flags="u4", meta="16u1")
-    assert c_typedef("Thing", dtype) == ("typedef struct { float center[3]; float radius; float box[2][3]; int index; "
-                                         "uint flags; uchar meta[16]; } Thing;")
+    assert c_typedef("Thing", dtype) == (
+        "typedef struct { float center[3]; float radius; float box[2][3]; int index; "
+        "uint flags; uchar meta[16]; } Thing;"
+    )
 
 
 def test_a_record_needs_a_multiple_of_16_bytes() -> None:

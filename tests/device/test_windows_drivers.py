@@ -43,8 +43,10 @@ def test_drivers_of_pip(tmp_path: Path) -> None:
 def test_a_driver_that_is_not_loaded() -> None:
     """The message contains the registry command that lists the driver."""
     told = not_loaded(Driver(r"C:\py\Library\bin\intelocl64.dll", "pip"))
-    assert told.endswith(r'reg add HKLM\SOFTWARE\Khronos\OpenCL\Vendors /v "C:\py\Library\bin\intelocl64.dll" '
-                         "/t REG_DWORD /d 0")
+    assert told.endswith(
+        r'reg add HKLM\SOFTWARE\Khronos\OpenCL\Vendors /v "C:\py\Library\bin\intelocl64.dll" '
+        "/t REG_DWORD /d 0"
+    )
 
 
 @pytest.mark.parametrize("named", [None, "three"])
@@ -66,11 +68,17 @@ def test_added_to_all_others(monkeypatch: pytest.MonkeyPatch, named: str | None)
     assert seen == [os.pathsep.join(["one", "two", *filter(None, [named])]), named] and dict(os.environ) == before
 
 
-@pytest.mark.parametrize(("system", "machine", "told"), [
-    ("linux", "x86_64", 'pip install "pyopencl[pocl]"'), ("linux", "aarch64", "pocl-opencl-icd"),
-    ("win32", "AMD64", "pip install intel-opencl-rt msvc-runtime"),
-    ("win32", "ARM64", "install your GPU vendor's driver"),
-    ("darwin", "arm64", "conda install"), ("freebsd14", "amd64", "install your GPU vendor's driver")])
+@pytest.mark.parametrize(
+    ("system", "machine", "told"),
+    [
+        ("linux", "x86_64", 'pip install "pyopencl[pocl]"'),
+        ("linux", "aarch64", "pocl-opencl-icd"),
+        ("win32", "AMD64", "pip install intel-opencl-rt msvc-runtime"),
+        ("win32", "ARM64", "install your GPU vendor's driver"),
+        ("darwin", "arm64", "conda install"),
+        ("freebsd14", "amd64", "install your GPU vendor's driver"),
+    ],
+)
 def test_what_to_install(system: str, machine: str, told: str) -> None:
     message = no_device(system, machine)
     assert message.startswith("no OpenCL device: ") and told in message

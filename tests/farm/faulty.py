@@ -9,7 +9,7 @@ from clrt.errors import DeviceError
 from clrt.farm import worker_tasks
 from clrt.rendering.accumulation.device_worker import DeviceWorker, WorkerShare
 
-if not hasattr(worker_tasks, "right"):    # Dask loads this more than once
+if not hasattr(worker_tasks, "right"):  # Dask loads this more than once
     setattr(worker_tasks, "right", (worker_tasks.identity, worker_tasks.render_share, DeviceWorker.ended))
 _identity, _share, _ended = getattr(worker_tasks, "right")
 _first: list[DeviceWorker] = []

@@ -24,8 +24,13 @@ CORNELL = Path(__file__).parents[2] / "scenes" / "cornell.toml"
 
 def command(folder: Path, *arguments: str) -> list[str]:
     """Return the words that it writes to standard output."""
-    done = subprocess.run([sys.executable, "-m", "clrt", "render", str(CORNELL), "--size", "32x24", "--spp", "4", "-q",
-                           *arguments], cwd=folder, capture_output=True, text=True, timeout=280)
+    done = subprocess.run(
+        [sys.executable, "-m", "clrt", "render", str(CORNELL), "--size", "32x24", "--spp", "4", "-q", *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=280,
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.split()
 
@@ -52,8 +57,12 @@ def test_nothing_listens_to_others() -> None:
         found = FarmRenderer(room(), cluster, size=(32, 24), spp=8)
         found.session.dispatch.wait_for(2)
         own = psutil.Process()
-        ports = [port for process in [own, *own.children(recursive=True)] for port in process.net_connections("inet")
-                 if port.status == psutil.CONN_LISTEN]
+        ports = [
+            port
+            for process in [own, *own.children(recursive=True)]
+            for port in process.net_connections("inet")
+            if port.status == psutil.CONN_LISTEN
+        ]
         assert len(ports) >= 3 and {port.laddr.ip for port in ports} == {"127.0.0.1"}
         with pytest.raises(DeviceError, match="does not answer"):
             connect(cluster.address.replace("tls://", "tcp://"))
@@ -67,6 +76,8 @@ def test_wrong_addresses() -> None:
 
 
 def test_dask_is_loaded_where_it_is_used() -> None:
-    program = ("import sys, clrt.cli.render, clrt.rendering.renderer; "
-               "sys.exit(bool({'dask', 'distributed'} & set(sys.modules)))")
+    program = (
+        "import sys, clrt.cli.render, clrt.rendering.renderer; "
+        "sys.exit(bool({'dask', 'distributed'} & set(sys.modules)))"
+    )
     assert subprocess.run([sys.executable, "-c", program]).returncode == 0

@@ -85,8 +85,11 @@ def at_pass(running: Renderer, number: int, event: Callable[[], Any], **stops: f
     assert passes > number
 
 
-@pytest.mark.parametrize("scene", [clamped(room(), 0.5, 0.05), clrt.load(SCENES / "cornell.toml"),
-                                   clrt.load(SCENES / "spheres.toml")], ids=lambda scene: scene.name)
+@pytest.mark.parametrize(
+    "scene",
+    [clamped(room(), 0.5, 0.05), clrt.load(SCENES / "cornell.toml"), clrt.load(SCENES / "spheres.toml")],
+    ids=lambda scene: scene.name,
+)
 def test_same_picture(cluster: Cluster, small_tasks: None, scene: Scene) -> None:
     """Film, estimate and history are equal, and all four workers took part."""
     expected = alone(scene)
@@ -117,6 +120,7 @@ def test_pictures_beside_it(cluster: Cluster) -> None:
 
 def test_workers_that_are_killed(processes: Processes, cluster: Cluster, small_tasks: None) -> None:
     """Two of four workers die during a pass and two join: no sample is lost or counted twice."""
+
     def event() -> None:
         for _ in range(2):
             processes.kill(processes.workers[0])
@@ -141,8 +145,9 @@ def test_one_that_sleeps(processes: Processes, cluster: Cluster, small_tasks: No
     assert same(expected, found)
 
 
-def test_those_that_lie_are_left_out(processes: Processes, cluster: Cluster, small_tasks: None,
-                                     caplog: pytest.LogCaptureFixture) -> None:
+def test_those_that_lie_are_left_out(
+    processes: Processes, cluster: Cluster, small_tasks: None, caplog: pytest.LogCaptureFixture
+) -> None:
     """A worker with another version and one that returns NaN are named with the fault."""
     processes.add_workers(1, FAULTS, CLRT_TEST_FAULT="version")
     processes.add_workers(1, FAULTS, CLRT_TEST_FAULT="nan")
@@ -159,8 +164,9 @@ def test_those_that_lie_are_left_out(processes: Processes, cluster: Cluster, sma
 
 
 @pytest.mark.parametrize("devices", [1, 2])
-def test_a_device_that_is_lost(processes: Processes, cluster: Cluster, small_tasks: None, devices: int,
-                               caplog: pytest.LogCaptureFixture) -> None:
+def test_a_device_that_is_lost(
+    processes: Processes, cluster: Cluster, small_tasks: None, devices: int, caplog: pytest.LogCaptureFixture
+) -> None:
     """The worker continues with its other device, or is excluded if it has none."""
     processes.add_workers(1, FAULTS, CLRT_TEST_FAULT="lost")
     expected, found = alone(room()), together(cluster, room(), 5, device=[0] * devices)
@@ -172,8 +178,14 @@ def test_a_device_that_is_lost(processes: Processes, cluster: Cluster, small_tas
     assert ("is excluded: the device is lost" in caplog.text) == (devices == 1)
 
 
-def test_a_device_that_failed_its_check(processes: Processes, cluster: Cluster, device: Device, tmp_path: Path,
-                                        monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_device_that_failed_its_check(
+    processes: Processes,
+    cluster: Cluster,
+    device: Device,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     """A worker without another device is excluded."""
     with monkeypatch.context() as there:
         there.setenv("CLRT_CACHE_DIR", str(tmp_path))
@@ -191,6 +203,7 @@ def test_a_device_that_failed_its_check(processes: Processes, cluster: Cluster, 
 
 def test_frames(cluster: Cluster) -> None:
     """24 frames, each rendered by one worker, equal those of one process, and all four workers took part."""
+
     def frame(name: str) -> PictureOrder:
         scene = room()
         moved = replace(scene.camera, position=tuple(np.add(scene.camera.position, (0, 0, int(name) / 100)).tolist()))
@@ -233,9 +246,11 @@ def test_bands(cluster: Cluster, tmp_path: Path) -> None:
     assert again.summary()["warnings"] == expected.report["warnings"] != []
 
 
-def test_a_scheduler_that_comes_back(processes: Processes, cluster: Cluster, small_tasks: None,
-                                     caplog: pytest.LogCaptureFixture) -> None:
+def test_a_scheduler_that_comes_back(
+    processes: Processes, cluster: Cluster, small_tasks: None, caplog: pytest.LogCaptureFixture
+) -> None:
     """The scheduler restarts during a pass with other workers: the render continues with its samples."""
+
     def event() -> None:
         processes.kill(processes.scheduler)
         for worker in list(processes.workers):
@@ -250,8 +265,9 @@ def test_a_scheduler_that_comes_back(processes: Processes, cluster: Cluster, sma
     assert sum(share["samples"] > 0 for share in found.session.shares() if share["lost"] is False) >= 1
 
 
-def test_a_scheduler_that_is_killed(processes: Processes, cluster: Cluster, small_tasks: None, tmp_path: Path,
-                                    monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_killed(
+    processes: Processes, cluster: Cluster, small_tasks: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The render ends with its samples in the checkpoint, which one machine resumes."""
     monkeypatch.setattr(dispatch, "GONE", 1.0)
     found = together(cluster, room(), 2, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e6)

@@ -59,17 +59,26 @@ def slowly_or_not(pid: int) -> Answer:
     return Answer(os.getpid())
 
 
-def test_one_that_goes_while_it_is_asked(processes: Processes, cluster: Cluster,
-                                         monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_that_goes_while_it_is_asked(
+    processes: Processes, cluster: Cluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The next worker answers."""
     renderer, leaver = sleeper(cluster, 0), processes.workers[0]
     processes.add_simulated(1)
     dispatch = renderer.session.dispatch
     dispatch.wait_for(2)
-    at_work = next(each for each in dispatch.ready()
-                   if cluster.ask(each.address, each.address, partial(os.getpid)).result() == leaver.pid)
-    monkeypatch.setattr(dispatch, "ready", lambda: sorted(
-        (each for each in dispatch.members.values() if each.ready), key=lambda each: each is not at_work))
+    at_work = next(
+        each
+        for each in dispatch.ready()
+        if cluster.ask(each.address, each.address, partial(os.getpid)).result() == leaver.pid
+    )
+    monkeypatch.setattr(
+        dispatch,
+        "ready",
+        lambda: sorted(
+            (each for each in dispatch.members.values() if each.ready), key=lambda each: each is not at_work
+        ),
+    )
     meet, turns = dispatch.meet, 0
 
     def disturbed() -> None:
@@ -100,16 +109,36 @@ def test_a_checkpoint_is_of_one_camera(cluster: Cluster, tmp_path: Path) -> None
 
 def band(**differs: Any) -> dict[str, Any]:
     """Return the report of one band of half an image, with the fields that count for the whole."""
-    return {"samples": 6144, "spp": 4, "rays": 10, "nonfinite_samples": 0, "noise": 0.1, "seconds": 1.0,
-            "stop_reason": "spp", "kernel": {"features": ["LIGHTS"]}, "brightest": 1.0, "light": 1.0,
-            "warnings": ["of the scene"], **differs}
+    return {
+        "samples": 6144,
+        "spp": 4,
+        "rays": 10,
+        "nonfinite_samples": 0,
+        "noise": 0.1,
+        "seconds": 1.0,
+        "stop_reason": "spp",
+        "kernel": {"features": ["LIGHTS"]},
+        "brightest": 1.0,
+        "light": 1.0,
+        "warnings": ["of the scene"],
+        **differs,
+    }
 
 
 def test_what_bands_say_together(tmp_path: Path) -> None:
     """Figures of a single band are not reported for the whole."""
     banded = BandedPicture(PictureOrder(room(), {"size": SIZE}, spp=4), tmp_path / "a.bands")
-    banded.reports = {name: band(device="one", seconds=seconds, samples_per_second=6144 / seconds, rays_per_second=1.0,
-                                 stop_reason="error", tile_noise=0.02) for name, seconds in (("a", 1.0), ("b", 9.0))}
+    banded.reports = {
+        name: band(
+            device="one",
+            seconds=seconds,
+            samples_per_second=6144 / seconds,
+            rays_per_second=1.0,
+            stop_reason="error",
+            tile_noise=0.02,
+        )
+        for name, seconds in (("a", 1.0), ("b", 9.0))
+    }
     told = banded.summary()
     assert told["worker_seconds"] == 10 and told["samples"] == 2 * 6144 and told["stop_reason"] == "error"
     assert not {"seconds", "samples_per_second", "rays_per_second", "tile_noise", "brightest", "light"} & set(told)
@@ -120,11 +149,14 @@ def test_what_bands_say_together(tmp_path: Path) -> None:
 def test_bands_warn_of_the_whole_picture(tmp_path: Path) -> None:
     """Warnings cover the samples dropped in all bands, the bias of all, and an image that is black everywhere."""
     banded = BandedPicture(PictureOrder(room(), {"size": SIZE, "clamp_direct": 1.0}, spp=4), tmp_path / "a.bands")
-    banded.reports = {"a": band(samples=100, nonfinite_samples=3, brightest=0.0, light=3.0, clamped_part=0.25),
-                      "b": band(samples=100, nonfinite_samples=4, light=1.0, clamped_part=0.5)}
+    banded.reports = {
+        "a": band(samples=100, nonfinite_samples=3, brightest=0.0, light=3.0, clamped_part=0.25),
+        "b": band(samples=100, nonfinite_samples=4, light=1.0, clamped_part=0.5),
+    }
     first, dropped, biased = banded.summary()["warnings"]
     assert first == "of the scene" and dropped.startswith("7 of 200 samples were not finite")
     assert biased.startswith("the image is biased by clamp_direct: 33.33% of the light was removed; the")
     banded.reports["b"]["brightest"] = 0.0
-    assert banded.summary()["warnings"][3:] == ["the image is black: no light reaches what the camera sees; "
-                                                "`clrt debug SCENE --pixel 32,24` shows why"]
+    assert banded.summary()["warnings"][3:] == [
+        "the image is black: no light reaches what the camera sees; `clrt debug SCENE --pixel 32,24` shows why"
+    ]

@@ -34,7 +34,7 @@ def test_every_pass_ends_as_if_all_had_waited(seed: int) -> None:
             if rng.random() < 0.2:
                 of.give_back(part)
                 continue
-            tiles = of.tiles[part.first:part.end]
+            tiles = of.tiles[part.first : part.end]
             pixels = ahead.film[tiles]
             assert np.all(pixels["count"] == part.samples)
             pixels["count"] += part.more

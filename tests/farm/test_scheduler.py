@@ -57,9 +57,18 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("scheme", ["tcp", "tls"])
-@pytest.mark.parametrize("answer", [None, b"", b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n",
-                                    b"SSH-2.0-OpenSSH_9.6\r\n", bytes(64), b"\xff" * 64,
-                                    *map(Random(1).randbytes, (7, 8, 9, 40))])
+@pytest.mark.parametrize(
+    "answer",
+    [
+        None,
+        b"",
+        b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\n\r\n",
+        b"SSH-2.0-OpenSSH_9.6\r\n",
+        bytes(64),
+        b"\xff" * 64,
+        *map(Random(1).randbytes, (7, 8, 9, 40)),
+    ],
+)
 def test_other_servers(answer: bytes | None, scheme: str) -> None:
     with server(answer) as address:
         refused(f"{scheme}://{address}")
@@ -89,7 +98,7 @@ def test_a_lookup_that_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_worker_is_no_scheduler(tmp_path: Path) -> None:
     with Processes(tmp_path) as processes:
         processes.add_workers(1)
-        cluster.ANSWER = 10.0    # restored by the fixture
+        cluster.ANSWER = 10.0  # restored by the fixture
         with connect(processes.address) as connected:
             while not (workers := connected.workers()):
                 pass

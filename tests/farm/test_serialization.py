@@ -44,7 +44,8 @@ def test_an_array_travels_once() -> None:
     parcel = pack(scene)
     text, arrays = parcel.text, parcel.arrays
     assert sorted(array.nbytes for array in arrays.values()) == sorted(
-        [vertices.nbytes, faces.nbytes, texels.nbytes, vertices[:, :2].nbytes])
+        [vertices.nbytes, faces.nbytes, texels.nbytes, vertices[:, :2].nbytes]
+    )
     arrived = unpack(text, arrays)
     assert arrived.instances[0].mesh is arrived.meshes[0] and arrived.meshes[1].material is arrived.meshes[0].material
     moved = pack(replace(scene, camera=clrt.Camera(position=(1, 2, 3))))
@@ -61,9 +62,18 @@ class Escape:
         return self.called
 
 
-@pytest.mark.parametrize("escape", [
-    Escape(open, "/etc/passwd"), Escape(os.system, "true"), Escape(eval, "1"), Escape(clrt.load, "x.toml"),
-    Escape(np.load, "x.npy"), Escape(pickle.loads, b"N.")], ids=lambda escape: escape.called[0].__name__)
+@pytest.mark.parametrize(
+    "escape",
+    [
+        Escape(open, "/etc/passwd"),
+        Escape(os.system, "true"),
+        Escape(eval, "1"),
+        Escape(clrt.load, "x.toml"),
+        Escape(np.load, "x.npy"),
+        Escape(pickle.loads, b"N."),
+    ],
+    ids=lambda escape: escape.called[0].__name__,
+)
 def test_a_text_calls_nothing(escape: Escape) -> None:
     """Only the classes of scenes and arrays may be named; anything else is refused before it is called."""
     with pytest.raises(SceneError, match="is not allowed in a scene"):
@@ -74,11 +84,12 @@ def test_reading_a_parcel_opens_no_file() -> None:
     """Files of the scene are not opened either: their textures and meshes are in the parcel."""
     parcel = pack(clrt.load(SCENES / "materials.toml"))
     text, arrays = parcel.text, parcel.arrays
-    unpack(text, arrays)     # load the modules
+    unpack(text, arrays)  # load the modules
     opened: list[str] = []
     listening = [True]
-    sys.addaudithook(lambda event, arguments: opened.append(event) if listening and event in ("open", "os.open")
-                     else None)
+    sys.addaudithook(
+        lambda event, arguments: opened.append(event) if listening and event in ("open", "os.open") else None
+    )
     unpack(text, arrays)
     listening.clear()
     assert not opened

@@ -26,14 +26,23 @@ class Gltf:
 
     def __init__(self) -> None:
         self.data = bytearray()
-        self.document: dict[str, Any] = {"asset": {"version": "2.0"}, "buffers": [], "bufferViews": [], "accessors": [],
-                                         "meshes": [], "nodes": [], "scenes": [{"nodes": []}], "scene": 0}
+        self.document: dict[str, Any] = {
+            "asset": {"version": "2.0"},
+            "buffers": [],
+            "bufferViews": [],
+            "accessors": [],
+            "meshes": [],
+            "nodes": [],
+            "scenes": [{"nodes": []}],
+            "scene": 0,
+        }
 
     def view(self, content: bytes, **keys: Any) -> int:
         """Add a buffer view of `content`, on a four-byte boundary."""
         self.data += bytes(-len(self.data) % 4)
         self.document["bufferViews"].append(
-            {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content), **keys})
+            {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content), **keys}
+        )
         self.data += content
         return len(self.document["bufferViews"]) - 1
 
@@ -42,8 +51,15 @@ class Gltf:
         values = np.asarray(values).reshape(len(values), -1)
         if view is None:
             view = self.view(values.astype(dtype).tobytes())
-        self.document["accessors"].append({"bufferView": view, "componentType": TYPES[dtype], "count": len(values),
-                                           "type": SHAPES[values.shape[1]], **keys})
+        self.document["accessors"].append(
+            {
+                "bufferView": view,
+                "componentType": TYPES[dtype],
+                "count": len(values),
+                "type": SHAPES[values.shape[1]],
+                **keys,
+            }
+        )
         return len(self.document["accessors"]) - 1
 
     def mesh(self, **primitive: Any) -> int:
@@ -65,8 +81,13 @@ class Gltf:
         text += b" " * (-len(text) % 4)
         chunk = bytes(self.data) + bytes(-len(self.data) % 4)
         length = 12 + 8 + len(text) + 8 + len(chunk)
-        return (struct.pack("<4sII", b"glTF", 2, length) + struct.pack("<I4s", len(text), b"JSON") + text
-                + struct.pack("<I4s", len(chunk), b"BIN\0") + chunk)
+        return (
+            struct.pack("<4sII", b"glTF", 2, length)
+            + struct.pack("<I4s", len(text), b"JSON")
+            + text
+            + struct.pack("<I4s", len(chunk), b"BIN\0")
+            + chunk
+        )
 
     def write(self, path: Path) -> Path:
         """Write .glb, or .gltf with its bytes in a data URI."""

@@ -16,9 +16,16 @@ from clrt.scene.geometry.transform import Matrix, rotation, unit
 from clrt.scene.lights import DirectionalLight
 from clrt.scene.model import Mesh
 
-BOXES = {"cube": ((-1, -1, -1), (1, 1, 1)), "tower": ((0, 0, 0), (1, 30, 1)), "plate": ((-5, 0, -5), (5, 0, 5)),
-         "wall": ((-5, 0, 0), (5, 3, 0)), "line": ((2, 2, 2), (9, 2, 2)), "tiny": ((0, 0, 0), (1e-20, 2e-20, 1e-20)),
-         "huge": ((-1e30, -1e30, -1e30), (1e30, 1e30, 1e30)), "far": ((1e6, 1e6, 1e6), (1e6 + 2, 1e6 + 1, 1e6 + 4))}
+BOXES = {
+    "cube": ((-1, -1, -1), (1, 1, 1)),
+    "tower": ((0, 0, 0), (1, 30, 1)),
+    "plate": ((-5, 0, -5), (5, 0, 5)),
+    "wall": ((-5, 0, 0), (5, 3, 0)),
+    "line": ((2, 2, 2), (9, 2, 2)),
+    "tiny": ((0, 0, 0), (1e-20, 2e-20, 1e-20)),
+    "huge": ((-1e30, -1e30, -1e30), (1e30, 1e30, 1e30)),
+    "far": ((1e6, 1e6, 1e6), (1e6 + 2, 1e6 + 1, 1e6 + 4)),
+}
 
 
 def box_mesh(low: tuple[float, ...], high: tuple[float, ...]) -> Mesh:
@@ -58,8 +65,8 @@ def test_vertices_without_a_face_do_not_count() -> None:
 
 
 def test_sky() -> None:
-    """It is blue above, brightest at the horizon, brown below, and uniform in azimuth; the sun is in front and above.
-    """
+    """It is blue above, brightest at the horizon, brown below, and uniform in azimuth; the sun is in front and
+    above."""
     image = default_sky(32).image
     assert image is not None and image.shape == (32, 64, 3) and image.dtype == np.float32
     assert (image == image[:, :1]).all() and (image > 0).all()
@@ -75,12 +82,20 @@ def wedge(path: Path, turn: Matrix) -> Path:
     points = np.array(corners) @ turn[:3, :3].T
     faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
     if path.suffix == ".obj":
-        lines = [*(f"v {x} {y} {z}" for x, y, z in points.tolist()),
-                 *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces)]
+        lines = [
+            *(f"v {x} {y} {z}" for x, y, z in points.tolist()),
+            *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces),
+        ]
     else:
         vertex = ["vertex {} {} {}".format(*point) for point in points.tolist()]
-        lines = ["solid wedge", *(f"facet normal 0 0 0\nouter loop\n{vertex[a]}\n{vertex[b]}\n{vertex[c]}\nendloop\n"
-                                  "endfacet" for a, b, c in faces), "endsolid"]
+        lines = [
+            "solid wedge",
+            *(
+                f"facet normal 0 0 0\nouter loop\n{vertex[a]}\n{vertex[b]}\n{vertex[c]}\nendloop\nendfacet"
+                for a, b, c in faces
+            ),
+            "endsolid",
+        ]
     path.write_text("\n".join(lines) + "\n")
     return path
 
@@ -93,7 +108,7 @@ def test_a_named_view_shows_the_model_as_if_it_were_turned(view: str, degrees: f
     turned = load(wedge(tmp_path / "b.obj", turn.T))
     for own, other in [(seen.camera.position, turned.camera.position), (seen.camera.look_at, turned.camera.look_at)]:
         np.testing.assert_allclose(own, turn[:3, :3] @ other, atol=1e-6)
-    sun, = seen.lights
+    (sun,) = seen.lights
     assert isinstance(sun, DirectionalLight) and sun.irradiance == SUN.irradiance
     np.testing.assert_allclose(unit(np.array(sun.direction)), turn[:3, :3] @ unit(np.array(SUN.direction)), atol=1e-12)
 

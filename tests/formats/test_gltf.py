@@ -32,7 +32,7 @@ def corners(model: Model) -> NDArray[np.float32]:
 def test_containers_and_index_types(name: str, dtype: str, tmp_path: Path) -> None:
     gltf = Gltf()
     gltf.mesh(attributes={"POSITION": gltf.accessor(VERTICES)}, indices=gltf.accessor(FACES.ravel(), dtype))
-    mesh, = read(gltf, tmp_path, name).meshes
+    (mesh,) = read(gltf, tmp_path, name).meshes
     np.testing.assert_array_equal(mesh.vertices, VERTICES)
     np.testing.assert_array_equal(mesh.faces, FACES)
     assert mesh.normals is None and mesh.material == MetallicRoughness(color=(1, 1, 1), metallic=1, roughness=1)
@@ -50,18 +50,26 @@ def test_interleaved_vertices(tmp_path: Path) -> None:
     rows = np.zeros(len(VERTICES), [("position", "<f4", 3), ("color", "<u4"), ("normal", "<f4", 3)])
     rows["position"], rows["normal"] = VERTICES, -VERTICES
     view = gltf.view(b"head" + rows.tobytes(), byteStride=rows.itemsize)
-    attributes = {"POSITION": gltf.accessor(VERTICES, view=view, byteOffset=4),
-                  "NORMAL": gltf.accessor(VERTICES, view=view, byteOffset=20)}
+    attributes = {
+        "POSITION": gltf.accessor(VERTICES, view=view, byteOffset=4),
+        "NORMAL": gltf.accessor(VERTICES, view=view, byteOffset=20),
+    }
     gltf.mesh(attributes=attributes, indices=gltf.accessor(FACES.ravel(), "<u1"))
-    mesh, = read(gltf, tmp_path).meshes
+    (mesh,) = read(gltf, tmp_path).meshes
     np.testing.assert_array_equal(mesh.vertices, VERTICES)
     assert mesh.normals is not None
     np.testing.assert_allclose(mesh.normals, -VERTICES, atol=1e-6)
 
 
-@pytest.mark.parametrize("dtype, normalized, expected", [
-    ("<i1", True, [-1, -1, 0, 1]), ("<u1", True, [128 / 255, 129 / 255, 0, 127 / 255]),
-    ("<i2", True, [-128 / 32767, -127 / 32767, 0, 127 / 32767]), ("<i1", False, [-128, -127, 0, 127])])
+@pytest.mark.parametrize(
+    "dtype, normalized, expected",
+    [
+        ("<i1", True, [-1, -1, 0, 1]),
+        ("<u1", True, [128 / 255, 129 / 255, 0, 127 / 255]),
+        ("<i2", True, [-128 / 32767, -127 / 32767, 0, 127 / 32767]),
+        ("<i1", False, [-128, -127, 0, 127]),
+    ],
+)
 def test_quantised_positions(dtype: str, normalized: bool, expected: list[float], tmp_path: Path) -> None:
     """Specification 3.6.2.2: unsigned c / max, signed max(c / max, −1)."""
     gltf = Gltf()
@@ -69,28 +77,36 @@ def test_quantised_positions(dtype: str, normalized: bool, expected: list[float]
     points = np.stack([values, np.roll(values, 1), np.roll(values, 2)], axis=1)
     gltf.document["extensionsRequired"] = ["KHR_mesh_quantization"]
     gltf.mesh(attributes={"POSITION": gltf.accessor(points, dtype, normalized=normalized)}, mode=5)
-    mesh, = read(gltf, tmp_path).meshes
+    (mesh,) = read(gltf, tmp_path).meshes
     np.testing.assert_allclose(mesh.vertices[:, 0], expected, rtol=1e-7)
 
 
 @pytest.mark.parametrize("base", [True, False])
 def test_sparse_accessor(base: bool, tmp_path: Path) -> None:
     gltf = Gltf()
-    sparse = {"count": 2, "indices": {"bufferView": gltf.view(bytes([2, 5])), "componentType": 5121},
-              "values": {"bufferView": gltf.view(np.array([[7, 8, 9], [4, 5, 6]], "<f4").tobytes())}}
+    sparse = {
+        "count": 2,
+        "indices": {"bufferView": gltf.view(bytes([2, 5])), "componentType": 5121},
+        "values": {"bufferView": gltf.view(np.array([[7, 8, 9], [4, 5, 6]], "<f4").tobytes())},
+    }
     position = gltf.accessor(VERTICES, sparse=sparse)
     if not base:
         del gltf.document["accessors"][position]["bufferView"]
     gltf.mesh(attributes={"POSITION": position}, mode=6)
-    mesh, = read(gltf, tmp_path).meshes
+    (mesh,) = read(gltf, tmp_path).meshes
     expected = VERTICES * base
     expected[2], expected[5] = (7, 8, 9), (4, 5, 6)
     np.testing.assert_array_equal(mesh.vertices, expected)
 
 
-@pytest.mark.parametrize("mode, expected", [
-    (4, [[0, 1, 2], [3, 4, 5]]), (5, [[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]]),
-    (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0], [4, 5, 0]])])
+@pytest.mark.parametrize(
+    "mode, expected",
+    [
+        (4, [[0, 1, 2], [3, 4, 5]]),
+        (5, [[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]]),
+        (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0], [4, 5, 0]]),
+    ],
+)
 def test_modes(mode: int, expected: list[list[int]], tmp_path: Path) -> None:
     """Specification 3.7.2.1: strips {i, i+1+(i mod 2), i+2−(i mod 2)}, fans {i+1, i+2, 0}."""
     gltf = Gltf()
@@ -121,7 +137,7 @@ def test_node_hierarchy(scale: tuple[float, float, float], tmp_path: Path) -> No
         points = points @ matrix[:3, :3].T + matrix[:3, 3]
         return np.asarray(Rotation.from_quat(turns[1]).apply(points) + [5, 6, 7])
 
-    mesh, = read(gltf, tmp_path).meshes
+    (mesh,) = read(gltf, tmp_path).meshes
     np.testing.assert_allclose(mesh.vertices, place(split.astype(np.float64)), atol=1e-5)
     a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
     wound = np.cross(b - a, c - a)
@@ -138,13 +154,18 @@ def test_corners(tmp_path: Path) -> None:
     uv, uv1 = rng.uniform(0, 1, (2, 3, 2)).astype(np.float32)
     colors = np.array([[255, 0, 0, 51], [0, 255, 0, 102], [0, 0, 255, 255]])
     gltf = Gltf()
-    gltf.mesh(attributes={
-        "POSITION": gltf.accessor(TRIANGLE), "NORMAL": gltf.accessor(np.tile([0, 0, 1], (3, 1))),
-        "TANGENT": gltf.accessor(np.tile([1, 0, 0, 1], (3, 1))), "TEXCOORD_0": gltf.accessor(uv),
-        "TEXCOORD_1": gltf.accessor(np.round(uv1 * 65535), "<u2", normalized=True),
-        "COLOR_0": gltf.accessor(colors, "<u1", normalized=True)})
+    gltf.mesh(
+        attributes={
+            "POSITION": gltf.accessor(TRIANGLE),
+            "NORMAL": gltf.accessor(np.tile([0, 0, 1], (3, 1))),
+            "TANGENT": gltf.accessor(np.tile([1, 0, 0, 1], (3, 1))),
+            "TEXCOORD_0": gltf.accessor(uv),
+            "TEXCOORD_1": gltf.accessor(np.round(uv1 * 65535), "<u2", normalized=True),
+            "COLOR_0": gltf.accessor(colors, "<u1", normalized=True),
+        }
+    )
     gltf.document["nodes"][0]["scale"] = [-1, 1, 1]
-    mesh, = read(gltf, tmp_path).meshes
+    (mesh,) = read(gltf, tmp_path).meshes
     assert mesh.uv is not None and mesh.uv1 is not None and mesh.colors is not None and mesh.tangents is not None
     assert np.array_equal(mesh.uv, uv) and np.abs(mesh.uv1 - uv1).max() < 1e-5
     assert np.allclose(mesh.colors, colors / 255)
@@ -155,10 +176,12 @@ def cameras() -> Gltf:
     """Return a ball with cameras: one unnamed, one named by its node, one by itself, one
     orthographic, and an invalid one."""
     gltf = ball()
-    gltf.document["cameras"] = [{"type": "orthographic", "name": "nothing"},
-                                {"type": "perspective", "perspective": {"yfov": 0.5}},
-                                {"type": "perspective", "perspective": {"yfov": 1.0}, "name": "side"},
-                                {"type": "orthographic", "name": "plan", "orthographic": {"xmag": 9, "ymag": -1.5}}]
+    gltf.document["cameras"] = [
+        {"type": "orthographic", "name": "nothing"},
+        {"type": "perspective", "perspective": {"yfov": 0.5}},
+        {"type": "perspective", "perspective": {"yfov": 1.0}, "name": "side"},
+        {"type": "orthographic", "name": "plan", "orthographic": {"xmag": 9, "ymag": -1.5}},
+    ]
     gltf.node(camera=0)
     gltf.node(camera=1, translation=[10, 1, 0], rotation=[0, 0.5**0.5, 0, 0.5**0.5], scale=[2, 2, 2])
     gltf.node(camera=2, translation=[0, 0, 5])
@@ -174,12 +197,12 @@ def test_cameras(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     assert list(found) == ["camera 1", "side", "side 2", "plan"]
     assert 'left out: camera "nothing", which has neither an angle nor a height' in caplog.text
     plan = found["plan"]
-    assert (plan.projection, plan.view_height, plan.position) == ("orthographic", 3, (0, 0, 4))   # for any scale
+    assert (plan.projection, plan.view_height, plan.position) == ("orthographic", 3, (0, 0, 4))  # for any scale
     camera = found["camera 1"]
     view = np.subtract(camera.look_at, camera.position)
     assert camera.position == (10.0, 1.0, 0.0)
     assert camera.fov_degrees == pytest.approx(np.degrees(0.5))
-    np.testing.assert_allclose(view, [-101**0.5, 0, 0], atol=1e-12)  # at the distance of the ball
+    np.testing.assert_allclose(view, [-(101**0.5), 0, 0], atol=1e-12)  # at the distance of the ball
     np.testing.assert_allclose(camera.up, [0, 1, 0], atol=1e-15)
     assert (found["side"].position, found["side 2"].position) == ((0, 0, 5), (0, 0, 9))
 
@@ -200,8 +223,10 @@ def test_cameras_by_name(tmp_path: Path) -> None:
     scene.write_text(f'[camera]\nname = "sid"\nfov_degrees = 3\n{placed}')
     with pytest.raises(SceneError) as caught:
         load(scene)
-    assert caught.value.problems == [f'{scene}: camera.name: "sid" is unknown; did you mean "side"?',
-                                     f"{scene}: camera: has both a name and fov_degrees; keep one of them"]
+    assert caught.value.problems == [
+        f'{scene}: camera.name: "sid" is unknown; did you mean "side"?',
+        f"{scene}: camera: has both a name and fov_degrees; keep one of them",
+    ]
     scene.write_text('[camera]\nname = "side"\n')
     with pytest.raises(SceneError, match='"side" is unknown, as neither .cameras. nor a model file has one'):
         load(scene)
@@ -210,23 +235,39 @@ def test_cameras_by_name(tmp_path: Path) -> None:
 def compressed() -> Gltf:
     """Return a ball compressed with Draco, with positions to 2^-20 of its size; its normals point inward."""
     import DracoPy
-    content = DracoPy.encode(VERTICES, FACES.astype(np.uint32), quantization_bits=20, preserve_order=True,
-                             normals=-VERTICES.astype(np.float64))
+
+    content = DracoPy.encode(
+        VERTICES,
+        FACES.astype(np.uint32),
+        quantization_bits=20,
+        preserve_order=True,
+        normals=-VERTICES.astype(np.float64),
+    )
     numbers = {attribute["attribute_type"]: attribute["unique_id"] for attribute in DracoPy.decode(content).attributes}
     count = len(DracoPy.decode(content).points)
     gltf = Gltf()
-    gltf.document["accessors"] = [{"componentType": 5126, "count": count, "type": "VEC3"},
-                                  {"componentType": 5126, "count": count, "type": "VEC3"},
-                                  {"componentType": 5125, "count": FACES.size, "type": "SCALAR"}]
+    gltf.document["accessors"] = [
+        {"componentType": 5126, "count": count, "type": "VEC3"},
+        {"componentType": 5126, "count": count, "type": "VEC3"},
+        {"componentType": 5125, "count": FACES.size, "type": "SCALAR"},
+    ]
     gltf.document["extensionsUsed"] = gltf.document["extensionsRequired"] = ["KHR_draco_mesh_compression"]
-    gltf.mesh(attributes={"POSITION": 0, "NORMAL": 1}, indices=2, extensions={"KHR_draco_mesh_compression": {
-        "bufferView": gltf.view(content), "attributes": {"POSITION": numbers[0], "NORMAL": numbers[1]}}})
+    gltf.mesh(
+        attributes={"POSITION": 0, "NORMAL": 1},
+        indices=2,
+        extensions={
+            "KHR_draco_mesh_compression": {
+                "bufferView": gltf.view(content),
+                "attributes": {"POSITION": numbers[0], "NORMAL": numbers[1]},
+            }
+        },
+    )
     return gltf
 
 
 def test_draco(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
-        mesh, = read(compressed(), tmp_path).meshes
+        (mesh,) = read(compressed(), tmp_path).meshes
     np.testing.assert_allclose(mesh.vertices[mesh.faces], VERTICES[FACES], atol=1e-5)
     assert mesh.normals is not None and not caplog.text
     np.testing.assert_allclose(mesh.normals, -mesh.vertices, atol=1e-5)
@@ -247,8 +288,9 @@ def test_draco_without_its_decoder(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     with pytest.raises(SceneError, match=r"decoder is not installed; pip install DracoPy, or export"):
         read(gltf, tmp_path)
     gltf = ball()
-    gltf.document["meshes"][0]["primitives"][0]["extensions"] = {"KHR_draco_mesh_compression": {
-        "bufferView": gltf.view(b"DRACO"), "attributes": {"POSITION": 0}}}
+    gltf.document["meshes"][0]["primitives"][0]["extensions"] = {
+        "KHR_draco_mesh_compression": {"bufferView": gltf.view(b"DRACO"), "attributes": {"POSITION": 0}}
+    }
     np.testing.assert_array_equal(corners(read(gltf, tmp_path)), VERTICES[FACES])
 
 
@@ -258,7 +300,7 @@ def test_extensions(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     gltf.document["extensionsUsed"] = ["EXT_b", "KHR_mesh_quantization", "EXT_a", "EXT_a"]
     with caplog.at_level(logging.WARNING):
         read(gltf, tmp_path)
-    warning, = caplog.messages
+    (warning,) = caplog.messages
     assert warning.endswith("left out: the extension EXT_a, the extension EXT_b")
     gltf.document["extensionsRequired"] = ["EXT_b", "EXT_meshopt_compression"]
     with pytest.raises(SceneError, match="needs the extension EXT_b, EXT_meshopt_compression, which is not supported"):

@@ -37,8 +37,10 @@ BROKEN = {
     "float index": (edited(*PRIMITIVE, "indices", value=0), "accessor 0 is VEC3, not SCALAR"),
     "signed index": (edited("accessors", 1, "componentType", value=5122), "accessor 1, are int16; they must"),
     "corners": (edited("accessors", 1, "count", value=58), "has 58 corners, which is not a multiple of 3"),
-    "zeros": (edited("accessors", 0, value={"componentType": 5126, "count": 10**12, "type": "VEC3"}),
-              "accessor 0: 1000000000000 elements without a bufferView"),
+    "zeros": (
+        edited("accessors", 0, value={"componentType": 5126, "count": 10**12, "type": "VEC3"}),
+        "accessor 0: 1000000000000 elements without a bufferView",
+    ),
     "cycle": (edited("nodes", 0, "children", value=[0]), "node 0: has two parents or is its own ancestor"),
     "child": (edited("nodes", 0, "children", value=[3]), "the scene uses node 3, but the file has 1"),
     "scene": (edited("scene", value=2), "the file uses scene 2, but the file has 1"),
@@ -57,7 +59,7 @@ def test_broken_documents(name: str, tmp_path: Path) -> None:
     gltf, sentence = BROKEN[name]
     with pytest.raises(SceneError) as caught:
         read_gltf(gltf.write(tmp_path / "a.glb"))
-    problem, = caught.value.problems
+    (problem,) = caught.value.problems
     assert problem.startswith(f"{tmp_path / 'a.glb'}: ") and sentence in problem
 
 
@@ -75,9 +77,16 @@ def test_cut_files(size: int, sentence: str, tmp_path: Path) -> None:
         read_gltf(tmp_path / "a.glb")
 
 
-@pytest.mark.parametrize("uri, sentence", [
-    ("lost.bin", 'cannot read the file "lost.bin"'), ("http://example.org/a.bin", "cannot read the file"),
-    (".", "cannot read the file"), ("data:;base64,A", "not base64"), ("data:;base64,AAAA", "buffer 0: has 3 of its")])
+@pytest.mark.parametrize(
+    "uri, sentence",
+    [
+        ("lost.bin", 'cannot read the file "lost.bin"'),
+        ("http://example.org/a.bin", "cannot read the file"),
+        (".", "cannot read the file"),
+        ("data:;base64,A", "not base64"),
+        ("data:;base64,AAAA", "buffer 0: has 3 of its"),
+    ],
+)
 def test_unreadable_buffers(uri: str, sentence: str, tmp_path: Path) -> None:
     ball().write_with_uri(tmp_path / "a.gltf", uri)
     with pytest.raises(SceneError, match=sentence):
@@ -85,17 +94,26 @@ def test_unreadable_buffers(uri: str, sentence: str, tmp_path: Path) -> None:
 
 
 @settings(max_examples=200, deadline=None)
-@given(edits=st.lists(st.tuples(st.floats(0, 1), st.one_of(st.binary(min_size=1, max_size=4),
-                                                           st.sampled_from([b"9", b"-", b"}", b"null", b"1e9"]))),
-                      min_size=1, max_size=4), cut=st.booleans())
-def test_damaged_files_raise_only_scene_errors(edits: list[tuple[float, bytes]], cut: bool,
-                                               tmp_path_factory: pytest.TempPathFactory) -> None:
+@given(
+    edits=st.lists(
+        st.tuples(
+            st.floats(0, 1),
+            st.one_of(st.binary(min_size=1, max_size=4), st.sampled_from([b"9", b"-", b"}", b"null", b"1e9"])),
+        ),
+        min_size=1,
+        max_size=4,
+    ),
+    cut=st.booleans(),
+)
+def test_damaged_files_raise_only_scene_errors(
+    edits: list[tuple[float, bytes]], cut: bool, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     content = bytearray(ball().glb())
     for place, new in edits:
         start = int(place * (len(content) - 1))
-        content[start:start + len(new)] = new
+        content[start : start + len(new)] = new
     path = tmp_path_factory.getbasetemp() / "damaged.glb"
-    path.write_bytes(content[:-int(edits[0][0] * 300) or None] if cut else content)
+    path.write_bytes(content[: -int(edits[0][0] * 300) or None] if cut else content)
     try:
         meshes = read_gltf(path).meshes
     except SceneError as error:

@@ -31,10 +31,15 @@ def many(rotation: str = "<f4") -> Gltf:
     turns = TURNS / np.linalg.norm(TURNS, axis=1, keepdims=True)
     if rotation == "<i2":
         quantised = gltf.accessor(np.round(turns * 32767), "<i2", normalized=True)
-    attributes = {"TRANSLATION": gltf.accessor(MOVES), "SCALE": gltf.accessor(SIZES),
-                  "ROTATION": quantised if rotation == "<i2" else gltf.accessor(TURNS)}
-    gltf.document["nodes"][0] |= {"translation": [0, 10, 0],
-                                  "extensions": {"EXT_mesh_gpu_instancing": {"attributes": attributes}}}
+    attributes = {
+        "TRANSLATION": gltf.accessor(MOVES),
+        "SCALE": gltf.accessor(SIZES),
+        "ROTATION": quantised if rotation == "<i2" else gltf.accessor(TURNS),
+    }
+    gltf.document["nodes"][0] |= {
+        "translation": [0, 10, 0],
+        "extensions": {"EXT_mesh_gpu_instancing": {"attributes": attributes}},
+    }
     gltf.document |= {"extensionsUsed": ["EXT_mesh_gpu_instancing"], "extensionsRequired": ["EXT_mesh_gpu_instancing"]}
     return gltf
 
@@ -52,7 +57,7 @@ def test_instances_of_a_node(rotation: str, few: int, tmp_path: Path, monkeypatc
     model = read_gltf(many(rotation).write(tmp_path / "a.glb"))
     assert (len(model.meshes), len(model.instances)) == ((COUNT, 0) if few else (0, COUNT))
     assert len({id(each.mesh) for each in model.instances}) == (0 if few else 1)
-    plain, = triangles(read_gltf(ball().write(tmp_path / "b.glb")))
+    (plain,) = triangles(read_gltf(ball().write(tmp_path / "b.glb")))
     for i, found in enumerate(triangles(model)):
         expected = (plain * SIZES[i]) @ Rotation.from_quat(TURNS[i]).as_matrix().T + MOVES[i] + [0, 10, 0]
         np.testing.assert_allclose(found, expected, atol=2e-3 if rotation == "<i2" else 1e-5)
@@ -65,7 +70,7 @@ def test_nodes_that_share_a_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     gltf.node(mesh=0, translation=[3, 0, 0])
     gltf.node(mesh=0, scale=[0, 0, 0])
     scene = load(gltf.write(tmp_path / "a.glb"))
-    hidden, = scene.meshes
+    (hidden,) = scene.meshes
     assert not hidden.vertices.any() and [each.to_world[0, 3] for each in scene.instances] == [0, 3]
     assert scene.camera.look_at[0] == pytest.approx(1.5, abs=0.2)
 
@@ -74,20 +79,27 @@ def test_a_mesh_table_places_a_files_instances(tmp_path: Path, monkeypatch: pyte
     """[[instance]] shows all of them again; each one's own matrix is applied first."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
     many().write(tmp_path / "a.glb")
-    (tmp_path / "s.toml").write_text('[[mesh]]\nname = "crowd"\nfile = "a.glb"\nscale = 2\n'
-                                     '[[instance]]\nmesh = "crowd"\ntranslate = [5, 0, 0]\n')
+    (tmp_path / "s.toml").write_text(
+        '[[mesh]]\nname = "crowd"\nfile = "a.glb"\nscale = 2\n[[instance]]\nmesh = "crowd"\ntranslate = [5, 0, 0]\n'
+    )
     scene = load(tmp_path / "s.toml")
     assert not scene.meshes and len(scene.instances) == 2 * COUNT
     once = 2 * (MOVES + [0, 10, 0])
-    np.testing.assert_allclose([each.to_world[:, 3] for each in scene.instances],
-                               np.concatenate([once, once + [5, 0, 0]]), rtol=1e-6)
+    np.testing.assert_allclose(
+        [each.to_world[:, 3] for each in scene.instances], np.concatenate([once, once + [5, 0, 0]]), rtol=1e-6
+    )
 
 
-@pytest.mark.parametrize("damage, message", [
-    ({"TRANSLATION": 2, "SCALE": 0}, "has 7 and 12 transforms; write the same"), ({}, "has no transforms"),
-    ({"TRANSLATION": 4}, "accessor 4 is VEC4, not VEC3"), ({"TRANSLATION": 99}, "accessor 99, but the file has"),
-    ({"ROTATION": 5}, "instance 0 has a transform that is not finite"),
-])
+@pytest.mark.parametrize(
+    "damage, message",
+    [
+        ({"TRANSLATION": 2, "SCALE": 0}, "has 7 and 12 transforms; write the same"),
+        ({}, "has no transforms"),
+        ({"TRANSLATION": 4}, "accessor 4 is VEC4, not VEC3"),
+        ({"TRANSLATION": 99}, "accessor 99, but the file has"),
+        ({"ROTATION": 5}, "instance 0 has a transform that is not finite"),
+    ],
+)
 def test_damage(damage: dict[str, int], message: str, tmp_path: Path) -> None:
     gltf = many()
     gltf.accessor(np.zeros((COUNT, 4)))

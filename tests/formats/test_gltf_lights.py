@@ -18,7 +18,7 @@ from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from .glb import Gltf
 
 NAME = "KHR_lights_punctual"
-DOWN = [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)]    # A quarter turn about x: −Z becomes −Y
+DOWN = [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)]  # A quarter turn about x: −Z becomes −Y
 
 
 def lit(*lights: dict[str, Any]) -> Gltf:
@@ -34,12 +34,16 @@ def held(index: int) -> dict[str, Any]:
 
 
 def test_lights_stand_where_their_nodes_do(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """They have the world position and −Z of their nodes; scales do not affect intensity. candela are W/sr, lux W/m².
-    """
+    """They have the world position and −Z of their nodes; scales do not affect intensity. candela are W/sr, lux
+    W/m²."""
     cone = {"innerConeAngle": math.pi / 12, "outerConeAngle": math.pi / 6}
-    gltf = lit({"type": "point", "color": [1, 0.5, 0.25], "intensity": 40, "name": "bulb"},
-               {"type": "directional", "intensity": 3}, {"type": "spot", "intensity": 100, "spot": cone},
-               {"type": "spot"}, {"type": "point", "name": "not in the scene"})
+    gltf = lit(
+        {"type": "point", "color": [1, 0.5, 0.25], "intensity": 40, "name": "bulb"},
+        {"type": "directional", "intensity": 3},
+        {"type": "spot", "intensity": 100, "spot": cone},
+        {"type": "spot"},
+        {"type": "point", "name": "not in the scene"},
+    )
     inner = gltf.node(root=False, translation=[0, 0, 2], extensions=held(2))
     gltf.node(children=[inner], translation=[1, 2, 3], rotation=DOWN, scale=[2, 2, -2])
     gltf.node(translation=[0, 5, 0], scale=[9, 9, 9], extensions=held(0))
@@ -51,7 +55,7 @@ def test_lights_stand_where_their_nodes_do(tmp_path: Path, caplog: pytest.LogCap
     assert point == PointLight(position=(0, 5, 0), intensity=(40, 20, 10))
     np.testing.assert_allclose(sun.direction, (0, -1, 0), atol=1e-12)
     assert sun.irradiance == (3.0, 3.0, 3.0)
-    np.testing.assert_allclose(spot.position, (1, -2, 3), atol=1e-12)   # −2·2 along the rotated z, which is +y
+    np.testing.assert_allclose(spot.position, (1, -2, 3), atol=1e-12)  # −2·2 along the rotated z, which is +y
     np.testing.assert_allclose(spot.direction, (0, 1, 0), atol=1e-12)
     assert spot.intensity == (100.0, 100.0, 100.0)
     assert (spot.inner_degrees, spot.outer_degrees) == pytest.approx((15, 30))
@@ -68,7 +72,7 @@ def test_cones_of_one_width_are_sharp(tmp_path: Path) -> None:
     wide = float(np.float32(math.pi / 2))
     gltf = lit({"type": "spot", "spot": {"innerConeAngle": wide, "outerConeAngle": wide}})
     gltf.node(extensions=held(0))
-    spot, = load(gltf.write(tmp_path / "spot.gltf")).lights
+    (spot,) = load(gltf.write(tmp_path / "spot.gltf")).lights
     assert isinstance(spot, SpotLight) and 89.9 < spot.inner_degrees < spot.outer_degrees == 90
 
 
@@ -89,11 +93,12 @@ def test_a_scene_file_asks_for_a_models_lights(tmp_path: Path) -> None:
         gltf.node(translation=[1, 0, 0], extensions=held(index))
     gltf.write(tmp_path / "lamps.glb")
     scene = tmp_path / "scene.toml"
-    scene.write_text('[[mesh]]\nfile = "lamps.glb"\nlights = true\n'
-                     'scale = 2\nrotate_degrees = [0, 90, 0]\ntranslate = [0, 5, 0]\n')
+    scene.write_text(
+        '[[mesh]]\nfile = "lamps.glb"\nlights = true\nscale = 2\nrotate_degrees = [0, 90, 0]\ntranslate = [0, 5, 0]\n'
+    )
     point, spot, sun = load(scene).lights
     assert isinstance(point, PointLight) and isinstance(spot, SpotLight) and isinstance(sun, DirectionalLight)
-    np.testing.assert_allclose(point.position, (0, 5, -2), atol=1e-6)   # A quarter turn about +y takes +x to −z
+    np.testing.assert_allclose(point.position, (0, 5, -2), atol=1e-6)  # A quarter turn about +y takes +x to −z
     np.testing.assert_allclose(spot.position, (0, 5, -2), atol=1e-6)
     for light in (spot, sun):
         np.testing.assert_allclose(light.direction, (-1, 0, 0), atol=1e-6)
@@ -104,12 +109,16 @@ def test_a_scene_file_asks_for_a_models_lights(tmp_path: Path) -> None:
     assert load(scene).lights == []
 
 
-@pytest.mark.parametrize(("light", "words"), [
-    ({"type": "area"}, r"extensions.KHR_lights_punctual.lights\[0\].type: "),
-    ({"type": "point", "intensity": -1}, r"lights\[0\].intensity: .*greater than or equal to 0"),
-    ({"type": "point", "color": [1, 1]}, r"lights\[0\].color"),
-    ({"type": "spot", "spot": {"outerConeAngle": 2}}, r"lights\[0\].spot.outerConeAngle: "),
-    ({"type": "point", "intensity": 1e39}, r"light\[0\].intensity: .* is outside the range of float32")])
+@pytest.mark.parametrize(
+    ("light", "words"),
+    [
+        ({"type": "area"}, r"extensions.KHR_lights_punctual.lights\[0\].type: "),
+        ({"type": "point", "intensity": -1}, r"lights\[0\].intensity: .*greater than or equal to 0"),
+        ({"type": "point", "color": [1, 1]}, r"lights\[0\].color"),
+        ({"type": "spot", "spot": {"outerConeAngle": 2}}, r"lights\[0\].spot.outerConeAngle: "),
+        ({"type": "point", "intensity": 1e39}, r"light\[0\].intensity: .* is outside the range of float32"),
+    ],
+)
 def test_mistakes_are_named(tmp_path: Path, light: dict[str, Any], words: str) -> None:
     gltf = lit(light)
     gltf.node(extensions=held(0))

@@ -22,8 +22,10 @@ def morphed(weights: list[float] | None, node_weights: list[float] | None = None
     gltf = Gltf()
     normals = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
     first, second = ({"POSITION": gltf.accessor(moves)} for moves in MOVES)
-    gltf.mesh(attributes={"POSITION": gltf.accessor(TRIANGLE), "NORMAL": gltf.accessor(normals)},
-              targets=[first | {"NORMAL": gltf.accessor(MOVES[0])}, second])
+    gltf.mesh(
+        attributes={"POSITION": gltf.accessor(TRIANGLE), "NORMAL": gltf.accessor(normals)},
+        targets=[first | {"NORMAL": gltf.accessor(MOVES[0])}, second],
+    )
     if weights is not None:
         gltf.document["meshes"][0]["weights"] = weights
     if node_weights is not None:

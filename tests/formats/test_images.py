@@ -40,15 +40,19 @@ def stored(path: Path, pixels: FloatArray, **spec_fields: object) -> None:
     assert output.open(str(path), spec) and output.write_image(np.ascontiguousarray(pixels)) and output.close()
 
 
-@pytest.mark.parametrize("name, content, message", [
-    ("none.exr", None, "no such picture file"),
-    ("empty.exr", b"", "empty"),
-    ("noise.png", b"\x00\x01garbage" * 50, "cannot be decoded"),
-    ("text.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 50000 +X 50000\n\x02\x02", "cannot be decoded"),
-    ("raw.exr", b"v/1\x01\x02\x00\x00\x00\xff\xfe\xfd", "cannot be decoded"),
-])
-def test_unreadable_pictures_are_scene_errors(tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str,
-                                              content: bytes | None, message: str) -> None:
+@pytest.mark.parametrize(
+    "name, content, message",
+    [
+        ("none.exr", None, "no such picture file"),
+        ("empty.exr", b"", "empty"),
+        ("noise.png", b"\x00\x01garbage" * 50, "cannot be decoded"),
+        ("text.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 50000 +X 50000\n\x02\x02", "cannot be decoded"),
+        ("raw.exr", b"v/1\x01\x02\x00\x00\x00\xff\xfe\xfd", "cannot be decoded"),
+    ],
+)
+def test_unreadable_pictures_are_scene_errors(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: str, content: bytes | None, message: str
+) -> None:
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)
@@ -112,8 +116,13 @@ def test_a_sky_is_read_as_its_library_reads_it(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found, rgbe_rounded(pixels))
     np.testing.assert_allclose(found, expected, rtol=2e-7)  # the library computes powers in float32
     whole = path.read_bytes()
-    for wrong in (whole[:-1], whole.replace(b"+X 300", b"+X 301"), whole.replace(b"#?RAD", b"#?RAX"),
-                  whole.replace(b"FORMAT", b"EXPOSURE=2\nFORMAT"), whole.replace(b"\x02\x02\x01", b"\x02\x03\x01", 1)):
+    for wrong in (
+        whole[:-1],
+        whole.replace(b"+X 300", b"+X 301"),
+        whole.replace(b"#?RAD", b"#?RAX"),
+        whole.replace(b"FORMAT", b"EXPOSURE=2\nFORMAT"),
+        whole.replace(b"\x02\x02\x01", b"\x02\x03\x01", 1),
+    ):
         path.write_bytes(wrong)
         assert read_radiance(path) is None
 
@@ -146,8 +155,9 @@ def test_a_small_file_may_not_claim_a_huge_picture(tmp_path: Path) -> None:
     """A PNG that declares 60 000 by 60 000 pixels with a few bytes of data costs neither memory nor time."""
     header = struct.pack(">IIBBBBB", 60000, 60000, 8, 2, 0, 0, 0)
     chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b"")]
-    content = b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + kind + data + struct.pack(
-        ">I", zlib.crc32(kind + data)) for kind, data in chunks)
+    content = b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    )
     (tmp_path / "a.png").write_bytes(content)
     with pytest.raises(SceneError, match="cannot be decoded as an image"):
         read_picture(tmp_path / "a.png")

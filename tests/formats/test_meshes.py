@@ -36,9 +36,11 @@ def obj_with_normals(path: Path) -> None:
 
 def ply_header(encoding: str, normals: bool = False) -> str:
     columns = ["x", "y", "z"] + ["nx", "ny", "nz"] * normals
-    return "\n".join([f"ply\nformat {encoding} 1.0\nelement vertex {len(VERTICES)}"]
-                     + [f"property float {column}" for column in columns]
-                     + [f"element face {len(FACES)}", "property list uchar int vertex_indices", "end_header\n"])
+    return "\n".join(
+        [f"ply\nformat {encoding} 1.0\nelement vertex {len(VERTICES)}"]
+        + [f"property float {column}" for column in columns]
+        + [f"element face {len(FACES)}", "property list uchar int vertex_indices", "end_header\n"]
+    )
 
 
 def ply_ascii(path: Path) -> None:
@@ -59,8 +61,11 @@ def ply_big_endian(path: Path) -> None:
 def ply_with_normals(path: Path) -> None:
     faces = np.zeros(len(FACES), [("n", "u1"), ("corners", "<i4", 3)])
     faces["n"], faces["corners"] = 3, FACES
-    path.write_bytes(ply_header("binary_little_endian", normals=True).encode()
-                     + np.hstack([VERTICES, -VERTICES]).astype("<f4").tobytes() + faces.tobytes())
+    path.write_bytes(
+        ply_header("binary_little_endian", normals=True).encode()
+        + np.hstack([VERTICES, -VERTICES]).astype("<f4").tobytes()
+        + faces.tobytes()
+    )
 
 
 def stl_binary(path: Path) -> None:
@@ -70,8 +75,12 @@ def stl_binary(path: Path) -> None:
 
 
 def stl_ascii(path: Path) -> None:
-    facets = ["facet normal 0 0 0\nouter loop\n" + "\n".join(f"vertex {row}" for row in text_rows(corners))
-              + "\nendloop\nendfacet" for corners in VERTICES[FACES]]
+    facets = [
+        "facet normal 0 0 0\nouter loop\n"
+        + "\n".join(f"vertex {row}" for row in text_rows(corners))
+        + "\nendloop\nendfacet"
+        for corners in VERTICES[FACES]
+    ]
     path.write_text("solid ball\n" + "\n".join(facets) + "\nendsolid ball\n")
 
 
@@ -80,8 +89,17 @@ def off(path: Path) -> None:
     path.write_text(f"OFF\n# a ball\n{len(VERTICES)} {len(FACES)} 0\n" + "\n".join(rows) + "\n")
 
 
-WRITERS = {"a.obj": obj, "n.obj": obj_with_normals, "a.ply": ply_ascii, "b.ply": ply_binary, "c.ply": ply_big_endian,
-           "n.ply": ply_with_normals, "a.stl": stl_ascii, "b.STL": stl_binary, "a.off": off}
+WRITERS = {
+    "a.obj": obj,
+    "n.obj": obj_with_normals,
+    "a.ply": ply_ascii,
+    "b.ply": ply_binary,
+    "c.ply": ply_big_endian,
+    "n.ply": ply_with_normals,
+    "a.stl": stl_ascii,
+    "b.STL": stl_binary,
+    "a.off": off,
+}
 
 
 def triangles(mesh: Mesh) -> np.ndarray:
@@ -93,7 +111,7 @@ def triangles(mesh: Mesh) -> np.ndarray:
 @pytest.mark.parametrize("name", WRITERS)
 def test_every_format_gives_back_the_ball(name: str, tmp_path: Path) -> None:
     WRITERS[name](tmp_path / name)
-    mesh, = read_mesh(tmp_path / name)
+    (mesh,) = read_mesh(tmp_path / name)
     assert mesh.vertices.dtype == np.float32 and mesh.faces.dtype == np.int32
     np.testing.assert_array_equal(triangles(mesh), triangles(Mesh(VERTICES, FACES)))
     assert mesh.material == Diffuse()
@@ -112,15 +130,30 @@ def test_every_format_gives_back_the_ball(name: str, tmp_path: Path) -> None:
 def test_a_ply_file_says_the_same_to_both_readers(encoding: str, tmp_path: Path) -> None:
     """Both readers agree on files with unused colours, flags and double precision; other files are left to trimesh."""
     order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[encoding]
-    vertices = np.zeros(3, [("x", f"{order}f8"), ("y", f"{order}f8"), ("z", f"{order}f8"), ("red", "u1"),
-                            *((name, f"{order}f4") for name in ("nx", "ny", "nz"))])
+    vertices = np.zeros(
+        3,
+        [
+            ("x", f"{order}f8"),
+            ("y", f"{order}f8"),
+            ("z", f"{order}f8"),
+            ("red", "u1"),
+            *((name, f"{order}f4") for name in ("nx", "ny", "nz")),
+        ],
+    )
     faces = np.zeros(2, [("flags", "u1"), ("count", "u1"), ("vertex_index", f"{order}u2", 3)])
     vertices["x"], vertices["y"], vertices["nz"] = [0.1, 1, 0], [0, 0, 1], [1, 2, 3]
     faces["count"], faces["vertex_index"] = 3, [[0, 1, 2], [2, 1, 0]]
-    header = "\n".join([f"ply\nformat {encoding} 1.0\ncomment a pair\nelement vertex 3",
-                        *(f"property double {name}" for name in "xyz"), "property uchar red",
-                        *(f"property float n{name}" for name in "xyz"), "element face 2", "property uchar flags",
-                        "property list uchar ushort vertex_index\nend_header\n"])
+    header = "\n".join(
+        [
+            f"ply\nformat {encoding} 1.0\ncomment a pair\nelement vertex 3",
+            *(f"property double {name}" for name in "xyz"),
+            "property uchar red",
+            *(f"property float n{name}" for name in "xyz"),
+            "element face 2",
+            "property uchar flags",
+            "property list uchar ushort vertex_index\nend_header\n",
+        ]
+    )
     rows = [" ".join(str(value) for field in row for value in np.ravel(field)) for row in [*vertices, *faces]]
     body = ("\n".join(rows) + "\n").encode() if encoding == "ascii" else vertices.tobytes() + faces.tobytes()
     path = tmp_path / "pair.ply"
@@ -131,8 +164,13 @@ def test_a_ply_file_says_the_same_to_both_readers(encoding: str, tmp_path: Path)
     assert ours is not None
     for name in ("vertices", "faces", "vertex_normals"):
         np.testing.assert_array_equal(ours[name], theirs[name])
-    for old, new in [(b"uchar red", b"uchar u"), (b"list uchar ushort", b"list uchar what"), (b"end_header", b"end"),
-                     (b"element face 2", b"element face 0"), (b"element vertex 3", b"element vertex 4")]:
+    for old, new in [
+        (b"uchar red", b"uchar u"),
+        (b"list uchar ushort", b"list uchar what"),
+        (b"end_header", b"end"),
+        (b"element face 2", b"element face 0"),
+        (b"element vertex 3", b"element vertex 4"),
+    ]:
         path.write_bytes((header.encode() + body).replace(old, new))
         assert plain_ply(path) is None
     path.write_bytes(header.encode() + body[:-9])
@@ -143,13 +181,15 @@ def test_polygons_are_cut_into_fans(tmp_path: Path) -> None:
     """A cube of quads and two triangles encloses 8; a hexagon has 4 triangles and its area is 3√3/2."""
     (tmp_path / "quads.off").write_text(
         "OFF\n8 7 0\n-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n-1 -1 1\n1 -1 1\n1 1 1\n-1 1 1\n"
-        "3 0 3 2\n3 0 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 2 3 7 6\n4 1 2 6 5\n4 3 0 4 7\n")
-    mesh, = read_mesh(tmp_path / "quads.off")
+        "3 0 3 2\n3 0 2 1\n4 4 5 6 7\n4 0 1 5 4\n4 2 3 7 6\n4 1 2 6 5\n4 3 0 4 7\n"
+    )
+    (mesh,) = read_mesh(tmp_path / "quads.off")
     assert volume(mesh.vertices, mesh.faces) == pytest.approx(8)
     angles = np.radians(60 * np.arange(6))
     (tmp_path / "hexagon.obj").write_text(
-        "\n".join(f"v {x} {y} 0" for x, y in zip(np.cos(angles), np.sin(angles))) + "\nf 1 2 3 4 5 6\n")
-    mesh, = read_mesh(tmp_path / "hexagon.obj")
+        "\n".join(f"v {x} {y} 0" for x, y in zip(np.cos(angles), np.sin(angles))) + "\nf 1 2 3 4 5 6\n"
+    )
+    (mesh,) = read_mesh(tmp_path / "hexagon.obj")
     a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
     assert len(mesh.faces) == 4
     assert np.cross(b - a, c - a)[:, 2].sum() / 2 == pytest.approx(1.5 * 3**0.5)
@@ -195,10 +235,20 @@ def test_obj_materials(library: str, tmp_path: Path, caplog: pytest.LogCaptureFi
 
 
 def test_obj_relative_indices_count_from_the_latest_vertex(tmp_path: Path) -> None:
-    lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vn 0 0 1", "f -3//-1 -2//-1 -1//-1",
-             "v 5 0 0", "v 6 0 0", "v 5 0 1", "vn 0 -1 0", "f -3//-1 -2//-1 -1//2"]
+    lines = [
+        "v 0 0 0",
+        "v 1 0 0",
+        "v 0 1 0",
+        "vn 0 0 1",
+        "f -3//-1 -2//-1 -1//-1",
+        "v 5 0 0",
+        "v 6 0 0",
+        "v 5 0 1",
+        "vn 0 -1 0",
+        "f -3//-1 -2//-1 -1//2",
+    ]
     (tmp_path / "a.obj").write_text("\n".join(lines))
-    mesh, = read_mesh(tmp_path / "a.obj")
+    (mesh,) = read_mesh(tmp_path / "a.obj")
     expected = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[5, 0, 0], [6, 0, 0], [5, 0, 1]]]
     np.testing.assert_array_equal(triangles(mesh), expected)
     assert mesh.normals is not None
@@ -206,8 +256,10 @@ def test_obj_relative_indices_count_from_the_latest_vertex(tmp_path: Path) -> No
 
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
-TRIANGLE = ("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-            "element face 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+TRIANGLE = (
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+)
 STRIPS = TRIANGLE.replace("element face", "element tristrips")
 BROKEN = {
     "nan.obj": (SQUARE.replace("1", "nan", 1) + "f 1 2 3", 'mesh "nan": vertices[1] = [nan, 0.0, 0.0] is not finite'),
@@ -240,7 +292,7 @@ def test_broken_models(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(content)
     with pytest.raises(SceneError) as caught:
         read_mesh(tmp_path / name)
-    problem, = caught.value.problems
+    (problem,) = caught.value.problems
     assert problem.startswith(f"{tmp_path / name}: ") and sentence in problem
 
 
@@ -255,7 +307,7 @@ def test_stl_is_welded_for_smooth_normals(tmp_path: Path) -> None:
     facets = np.zeros(len(faces), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     facets["corners"] = vertices[faces]
     (tmp_path / "cube.stl").write_bytes(bytes(80) + struct.pack("<I", len(faces)) + facets.tobytes())
-    mesh, = read_mesh(tmp_path / "cube.stl", "smooth")
+    (mesh,) = read_mesh(tmp_path / "cube.stl", "smooth")
     assert mesh.normals is not None
     np.testing.assert_allclose(mesh.normals, mesh.vertices / 3**0.5, atol=1e-6)
 
@@ -265,10 +317,13 @@ def test_colours_of_ply_files(face: str, tmp_path: Path) -> None:
     """Vertex colours are read by both PLY readers."""
     corners = "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n"
     properties = "".join(f"property float {axis}\n" for axis in "xyz") + "".join(
-        f"property uchar {color}\n" for color in ("red", "green", "blue"))
+        f"property uchar {color}\n" for color in ("red", "green", "blue")
+    )
     path = tmp_path / "a.ply"
-    path.write_text(f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face 1\n"
-                    f"property list uchar int vertex_indices\nend_header\n{corners}{face}\n")
+    path.write_text(
+        f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face 1\n"
+        f"property list uchar int vertex_indices\nend_header\n{corners}{face}\n"
+    )
     colors = read_mesh(path)[0].colors
     assert colors is not None
     np.testing.assert_allclose(colors, np.eye(3), atol=1e-6)

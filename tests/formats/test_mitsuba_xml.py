@@ -50,9 +50,11 @@ def test_steps_of_a_transform_are_taken_in_the_order_written() -> None:
     for _ in range(20):
         axis, offset, factors = rng.normal(size=(3, 3))
         angle = rng.uniform(-360, 360)
-        steps = {"rotate": {"value": " ".join(map(str, axis)), "angle": str(angle)},
-                 "translate": dict(zip("xyz", map(str, offset))),
-                 "scale": {"value": ", ".join(map(str, factors))}}
+        steps = {
+            "rotate": {"value": " ".join(map(str, axis)), "angle": str(angle)},
+            "translate": dict(zip("xyz", map(str, offset))),
+            "scale": {"value": ", ".join(map(str, factors))},
+        }
         turn = Rotation.from_rotvec(np.radians(angle) * axis / np.linalg.norm(axis))
         does = {"rotate": turn.apply, "translate": lambda p, by=offset: p + by, "scale": lambda p, by=factors: p * by}
         order = [str(name) for name in rng.permutation([*steps])]
@@ -84,36 +86,54 @@ def test_defaults_includes_references_and_paths(folder: Path) -> None:
     (folder / "parts").mkdir()
     (folder / "parts" / "look.xml").write_text(
         '<scene version="3.0.0"><bsdf type="diffuse" id="red">'
-        '<rgb name="reflectance" value="$shade, 0, 0"/></bsdf></scene>')
-    read = scene(folder, """<default name="shade" value="0.25"/><default name="shade" value="0.75"/>
+        '<rgb name="reflectance" value="$shade, 0, 0"/></bsdf></scene>'
+    )
+    read = scene(
+        folder,
+        """<default name="shade" value="0.25"/><default name="shade" value="0.75"/>
         <path value="parts"/><include filename="look.xml"/>
-        <shape type="sphere"><ref id="red"/></shape><shape type="sphere"><ref id="red"/></shape>""")
+        <shape type="sphere"><ref id="red"/></shape><shape type="sphere"><ref id="red"/></shape>""",
+    )
     first, second = read.spheres
     assert first.material == Diffuse(color=(0.25, 0, 0)) and second.material is first.material
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ('<shape type="torus"/>', ['shape[0]', '"torus"', "use rectangle"]),
-    ('<shape type="sphere"><bsdf type="velvet" id="v"/></shape>', ['bsdf "v"', '"velvet"', "diffuse"]),
-    ('<shape type="sphere"><ref id="none"/></shape>', ['shape[0]', '"none"', "define it"]),
-    ('<shape type="sphere"><float name="radius" value="wide"/></shape>', ["shape[0].radius", '"wide"', "a number"]),
-    ('<shape type="sphere"><float name="girth" value="2"/></shape>', ["shape[0]", '"girth"', "leave it out"]),
-    ('<shape type="sphere"><float name="radius" value="$r"/></shape>', ["shape[0]", "$r", "<default"]),
-    ('<shape type="sphere"><frame name="x"/></shape>', ["shape[0]", "<frame>", "transform"]),
-    ('<shape type="obj"><string name="filename" value="gone.obj"/></shape>', ["gone.obj", "no such model file"]),
-    ('<emitter type="spot"/>', ["emitter[0]", '"spot"', "point"]),
-    ('<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>', ["hide_emitters"]),
-    ('<sensor type="perspective"><transform name="to_world"><scale x="-1"/></transform></sensor>',
-     ["sensor[0]", "mirrors"]),
-    ('<sensor type="perspective"><transform name="to_world"><shear value="2"/></transform></sensor>',
-     ["sensor[0].to_world", "rotate"]),
-    ('<emitter type="constant"/><emitter type="constant"/>', ["several environment lights"]),
-    ('<shape type="sphere"><bsdf type="roughdielectric"/></shape>', ["shape[0].bsdf", '"beckmann"', '"ggx"']),
-    ('<shape type="sphere"><bsdf type="conductor"><string name="material" value="Xy"/></bsdf></shape>', ['"Xy"', "Au"]),
-    ('<shape type="sphere"><bsdf type="dielectric"><string name="int_ior" value="jam"/></bsdf></shape>',
-     ["int_ior", '"jam"', "bk7"]),
-    ('<include filename="scene.xml"/>', ["scene.xml", "included more than"]),
-    ("<shape>", ["is not valid XML"])], ids=str)
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('<shape type="torus"/>', ["shape[0]", '"torus"', "use rectangle"]),
+        ('<shape type="sphere"><bsdf type="velvet" id="v"/></shape>', ['bsdf "v"', '"velvet"', "diffuse"]),
+        ('<shape type="sphere"><ref id="none"/></shape>', ["shape[0]", '"none"', "define it"]),
+        ('<shape type="sphere"><float name="radius" value="wide"/></shape>', ["shape[0].radius", '"wide"', "a number"]),
+        ('<shape type="sphere"><float name="girth" value="2"/></shape>', ["shape[0]", '"girth"', "leave it out"]),
+        ('<shape type="sphere"><float name="radius" value="$r"/></shape>', ["shape[0]", "$r", "<default"]),
+        ('<shape type="sphere"><frame name="x"/></shape>', ["shape[0]", "<frame>", "transform"]),
+        ('<shape type="obj"><string name="filename" value="gone.obj"/></shape>', ["gone.obj", "no such model file"]),
+        ('<emitter type="spot"/>', ["emitter[0]", '"spot"', "point"]),
+        ('<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>', ["hide_emitters"]),
+        (
+            '<sensor type="perspective"><transform name="to_world"><scale x="-1"/></transform></sensor>',
+            ["sensor[0]", "mirrors"],
+        ),
+        (
+            '<sensor type="perspective"><transform name="to_world"><shear value="2"/></transform></sensor>',
+            ["sensor[0].to_world", "rotate"],
+        ),
+        ('<emitter type="constant"/><emitter type="constant"/>', ["several environment lights"]),
+        ('<shape type="sphere"><bsdf type="roughdielectric"/></shape>', ["shape[0].bsdf", '"beckmann"', '"ggx"']),
+        (
+            '<shape type="sphere"><bsdf type="conductor"><string name="material" value="Xy"/></bsdf></shape>',
+            ['"Xy"', "Au"],
+        ),
+        (
+            '<shape type="sphere"><bsdf type="dielectric"><string name="int_ior" value="jam"/></bsdf></shape>',
+            ["int_ior", '"jam"', "bk7"],
+        ),
+        ('<include filename="scene.xml"/>', ["scene.xml", "included more than"]),
+        ("<shape>", ["is not valid XML"]),
+    ],
+    ids=str,
+)
 def test_mistakes_are_named(folder: Path, text: str, words: list[str]) -> None:
     """By file, object, value and remedy."""
     said = problem(folder, text)
@@ -142,13 +162,17 @@ def test_materials(folder: Path) -> None:
     assert material(folder, twosided) == Diffuse(color=(1, 0, 0))
     mask = '<bsdf type="mask"><float name="opacity" value="0.3"/><bsdf type="conductor"/></bsdf>'
     assert material(folder, mask) == Mirror(opacity=0.3)
-    metal = ('<bsdf type="roughconductor"><spectrum name="eta" value="0.5"/><spectrum name="k" value="3"/>'
-             '<float name="alpha" value="0.04"/><string name="distribution" value="ggx"/></bsdf>')
+    metal = (
+        '<bsdf type="roughconductor"><spectrum name="eta" value="0.5"/><spectrum name="k" value="3"/>'
+        '<float name="alpha" value="0.04"/><string name="distribution" value="ggx"/></bsdf>'
+    )
     assert material(folder, metal) == Conductor(eta=(0.5,) * 3, k=(3.0,) * 3, roughness=0.2)
     glass = '<bsdf type="dielectric"><string name="int_ior" value="water"/><float name="ext_ior" value="1"/></bsdf>'
     assert material(folder, glass) == Dielectric(ior=1.333)
-    medium = ('<medium type="homogeneous" name="interior"><rgb name="sigma_t" value="1, 2, 4"/>'
-              '<float name="scale" value="0.5"/><rgb name="albedo" value="0"/></medium>')
+    medium = (
+        '<medium type="homogeneous" name="interior"><rgb name="sigma_t" value="1, 2, 4"/>'
+        '<float name="scale" value="0.5"/><rgb name="albedo" value="0"/></medium>'
+    )
     inside = material(folder, glass + medium)
     assert isinstance(inside, Dielectric) and inside.attenuation_distance == 0.5
     np.testing.assert_allclose(-np.log(inside.attenuation_color) / 0.5, [0.5, 1, 2])
@@ -217,10 +241,13 @@ def test_places_of_texture_coordinates() -> None:
 
 def test_spheres_and_instances(folder: Path) -> None:
     """A group of a mesh and a sphere, drawn by its instances alone."""
-    read = scene(folder, """<shape type="shapegroup" id="group"><shape type="rectangle"/><shape type="sphere">
+    read = scene(
+        folder,
+        """<shape type="shapegroup" id="group"><shape type="rectangle"/><shape type="sphere">
         <point name="center" value="1, 0, 0"/><float name="radius" value="0.5"/></shape></shape>
         <shape type="instance"><ref id="group"/><transform name="to_world"><scale value="2"/>
-        <rotate z="1" angle="90"/></transform></shape><shape type="instance"><ref id="group"/></shape>""")
+        <rotate z="1" angle="90"/></transform></shape><shape type="instance"><ref id="group"/></shape>""",
+    )
     assert not read.meshes and len(read.instances) == 2 and read.instances[0].mesh is read.instances[1].mesh
     np.testing.assert_allclose(read.spheres[0].center, [0, 2, 0], atol=1e-12)
     assert read.spheres[0].radius == pytest.approx(1) and read.spheres[1].radius == pytest.approx(0.5)
@@ -254,18 +281,20 @@ def test_attributes_of_a_mesh(folder: Path) -> None:
     (folder / "a.ply").write_text(PLY)
     shape = '<shape type="ply"><string name="filename" value="a.ply"/>{}</shape>'
     texture = '<texture type="mesh_attribute" name="{}"><string name="name" value="{}"/></texture>'
-    mesh = scene(folder, shape.format(f'<bsdf type="diffuse">{texture.format("reflectance", "vertex_color")}</bsdf>'
-                                      )).meshes[0]
+    mesh = scene(
+        folder, shape.format(f'<bsdf type="diffuse">{texture.format("reflectance", "vertex_color")}</bsdf>')
+    ).meshes[0]
     assert mesh.colors is not None and mesh.uv is not None and mesh.normals is not None
-    np.testing.assert_allclose(mesh.colors, [(.1, .2, .3), (.4, .5, .6), (.7, .8, .9), (0, 0, 1)], rtol=1e-6)
+    np.testing.assert_allclose(mesh.colors, [(0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), (0, 0, 1)], rtol=1e-6)
     np.testing.assert_array_equal(mesh.uv, [(0, 0), (1, 0), (1, 1), (0, 1)])  # upright, unlike OBJ's
     np.testing.assert_allclose(mesh.normals, np.tile([0, 0, 1], (4, 1)), atol=1e-6)
-    colors = "".join(f'<bsdf type="diffuse"><rgb name="reflectance" value="{value}"/></bsdf>'
-                     for value in ("0 0 0", "1 .5 .5"))
+    colors = "".join(
+        f'<bsdf type="diffuse"><rgb name="reflectance" value="{value}"/></bsdf>' for value in ("0 0 0", "1 .5 .5")
+    )
     blend = f'<bsdf type="blendbsdf">{texture.format("weight", "face_weight")}{colors}</bsdf>'
     mesh = scene(folder, shape.format(blend)).meshes[0]
     assert mesh.colors is not None
-    np.testing.assert_allclose(mesh.colors, np.repeat([(.25, .125, .125), (1, .5, .5)], 3, axis=0))
+    np.testing.assert_allclose(mesh.colors, np.repeat([(0.25, 0.125, 0.125), (1, 0.5, 0.5)], 3, axis=0))
     assert "face_weight" in problem(folder, shape.format(blend.replace("face_weight", "face_wait")))
 
 
@@ -286,8 +315,9 @@ def test_skies_keep_what_varies_linearly_between_poles() -> None:
 
 
 def test_the_tree_keeps_names_and_ids(folder: Path) -> None:
-    (folder / "scene.xml").write_text('<scene version="3.0.0"><bsdf type="diffuse" id="a"/>'
-                                      '<shape type="sphere"><ref id="a"/></shape></scene>')
+    (folder / "scene.xml").write_text(
+        '<scene version="3.0.0"><bsdf type="diffuse" id="a"/><shape type="sphere"><ref id="a"/></shape></scene>'
+    )
     root = read_xml(folder / "scene.xml")
     assert [child.where for _, child in root.children] == ['bsdf "a"', "shape[0]"]
     assert root.children[1][1].all("bsdf") == [root.children[0][1]]

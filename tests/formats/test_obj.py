@@ -27,7 +27,8 @@ MTL = {
     # A highlight of Blinn's exponent 30 is as wide as GGX's of alpha² = 2/32: roughness 1/2.
     "Kd 0.1 0.2 0.3\nKs 0.5 0.5 0.5\nNs 30\nillum 2": MetallicRoughness(color=(0.1, 0.2, 0.3), roughness=0.5),
     "Kd 0.1 0.2 0.3\nPr 0.25\nPm 1\nKs 1 1 1\nKe 1 1 1": MetallicRoughness(
-        color=(0.1, 0.2, 0.3), roughness=0.25, metallic=1, emission=(1, 1, 1)),
+        color=(0.1, 0.2, 0.3), roughness=0.25, metallic=1, emission=(1, 1, 1)
+    ),
     "Kd 1 1 1\nd 0.25": Diffuse(color=(1, 1, 1), opacity=0.25),
     "Kd 1 1 1\nTr 0.25": Diffuse(color=(1, 1, 1), opacity=0.75),
     "Kd 0 0 0\nKs 0.9 0.8 0.7\nillum 3": Mirror(color=(0.9, 0.8, 0.7)),
@@ -47,10 +48,13 @@ def test_maps_and_coordinates(tmp_path: Path) -> None:
     imageio.imwrite(tmp_path / "a b.png", np.zeros((2, 2, 3), np.uint8))
     (tmp_path / "a.mtl").write_text(
         "newmtl a\nKd 0.5 1 1\nmap_Kd -o 0.25 0.5 0 -s 2 3 1 -clamp on a b.png\nmap_d -imfchan g a b.png\n"
-        "map_Pr a b.png\nPr 0.5\nmap_Pm lost.png\nmap_Ke a b.png\nnorm -bm 0.5 a b.png")
-    (tmp_path / "a.obj").write_text("mtllib a.mtl\nv 0 0 0 1 0 0.5\nv 1 0 0 1 1 1\nv 0 1 0 0 0 0\nvt 0.1 0.2\nvt 1 0\n"
-                                    "vt 0 1\nusemtl a\nf 1/1 2/2 3/3")
-    mesh, = read_mesh(tmp_path / "a.obj")
+        "map_Pr a b.png\nPr 0.5\nmap_Pm lost.png\nmap_Ke a b.png\nnorm -bm 0.5 a b.png"
+    )
+    (tmp_path / "a.obj").write_text(
+        "mtllib a.mtl\nv 0 0 0 1 0 0.5\nv 1 0 0 1 1 1\nv 0 1 0 0 0 0\nvt 0.1 0.2\nvt 1 0\n"
+        "vt 0 1\nusemtl a\nf 1/1 2/2 3/3"
+    )
+    (mesh,) = read_mesh(tmp_path / "a.obj")
     made = mesh.material
     assert isinstance(made, MetallicRoughness) and isinstance(made.color, Texture) and isinstance(made.opacity, Texture)
     assert isinstance(made.roughness, Texture) and isinstance(made.emission, Texture) and made.normal_map is not None
@@ -61,24 +65,28 @@ def test_maps_and_coordinates(tmp_path: Path) -> None:
     upward = np.array([[0.1, 0.2], [1, 0], [0, 1]])
     shown = mesh.uv @ made.color.to_picture[:, :2].T + made.color.to_picture[:, 2]
     assert np.allclose(shown, (upward * (2, 3) + (0.25, 0.5)) * (1, -1) + (0, 1))
-    assert np.allclose(mesh.colors, [[1, 0, ((0.5 + 0.055) / 1.055)**2.4], [1, 1, 1], [0, 0, 0]])
+    assert np.allclose(mesh.colors, [[1, 0, ((0.5 + 0.055) / 1.055) ** 2.4], [1, 1, 1], [0, 0, 0]])
     (tmp_path / "a.obj").write_text("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3")
-    bare, = read_mesh(tmp_path / "a.obj")
+    (bare,) = read_mesh(tmp_path / "a.obj")
     assert bare.material == MetallicRoughness(color=(0.5, 1, 1), roughness=0.5, emission=(1, 1, 1))
 
 
 def test_mtl_tells_what_it_leaves_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    (tmp_path / "a.obj").write_text("mtllib my library.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
-                                    "usemtl a\nf 1 2 3\nusemtl b\nf 3 2 1")
+    (tmp_path / "a.obj").write_text(
+        "mtllib my library.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 3 2 1"
+    )
     library = tmp_path / "my library.mtl"
     library.write_text("newmtl a\nmap_Ka a.png\nbump c.png\nnewmtl b\nPc 1\nPr 1")
     with caplog.at_level(logging.WARNING):
         meshes = read_mesh(tmp_path / "a.obj")
     assert [mesh.material_name for mesh in meshes] == ["a", "b"]
-    warning, = caplog.messages
+    (warning,) = caplog.messages
     assert warning.endswith("a.obj: ignored: textures (bump, map_ka), clearcoat (Pc)")
-    for wrong, sentence in [("Kd 1 2", 'Kd is "1 2"; write three numbers'), ("Ns nan", 'Ns is "nan"; write a number'),
-                            ("Kd spectral a.rfl", 'Kd is "spectral a.rfl"; write three numbers')]:
+    for wrong, sentence in [
+        ("Kd 1 2", 'Kd is "1 2"; write three numbers'),
+        ("Ns nan", 'Ns is "nan"; write a number'),
+        ("Kd spectral a.rfl", 'Kd is "spectral a.rfl"; write three numbers'),
+    ]:
         library.write_text(f"newmtl a\n{wrong}")
         with pytest.raises(SceneError, match=f'a.obj: my library.mtl: material "a": {wrong[:2]} is'):
             read_mesh(tmp_path / "a.obj")
@@ -88,8 +96,9 @@ def test_obj_of_many_forms(tmp_path: Path) -> None:
     """Corners of all forms, quads and triangles, comments, continued lines, colours, arbitrary spacing."""
     (tmp_path / "a.obj").write_text(
         "# made by hand\n  v 0 0 0 1 0 0 # red\nv\t1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\nvt 0 0\nvt 1 0 0\n"
-        "vn 0 0 2\ns off\ng one\nf 1/1/1 2/2/1 3 \\\n4//1\n f 1 3 4 # last\nl 1 2\n")
-    mesh, = read_mesh(tmp_path / "a.obj")
+        "vn 0 0 2\ns off\ng one\nf 1/1/1 2/2/1 3 \\\n4//1\n f 1 3 4 # last\nl 1 2\n"
+    )
+    (mesh,) = read_mesh(tmp_path / "a.obj")
     expected = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])[[[0, 1, 2], [0, 2, 3], [0, 2, 3]]]
     np.testing.assert_array_equal(mesh.vertices[mesh.faces], expected)
     assert mesh.normals is not None

@@ -92,11 +92,16 @@ def test_a_whole_scene(folder: Path) -> None:
     assert (environment.color, environment.strength, environment.rotation_degrees) == ((0.05, 0.06, 0.08), 2, 90)
     ring = MetallicRoughness(preset="gold", roughness=0.2, smith="schlick")
     assert scene.spheres == [Sphere(center=(0, 1, 0), radius=2, material=ring)]
-    assert scene.lights == [PointLight(position=(1.5, 4, 3), intensity=(60, 58, 50)),
-                            DirectionalLight(direction=(0, -1, 0), irradiance=(1, 2, 3))]
+    assert scene.lights == [
+        PointLight(position=(1.5, 4, 3), intensity=(60, 58, 50)),
+        DirectionalLight(direction=(0, -1, 0), irradiance=(1, 2, 3)),
+    ]
     green, floor, mirrored = scene.meshes
     assert (green.material, floor.material, mirrored.material) == (
-        Diffuse(color=(0, 0.5, 0)), Diffuse(emission=(17, 12, 4)), Diffuse())
+        Diffuse(color=(0, 0.5, 0)),
+        Diffuse(emission=(17, 12, 4)),
+        Diffuse(),
+    )
     assert (floor.name, green.normals, mirrored.normals) == ("floor", None, None)
 
 
@@ -113,15 +118,19 @@ def test_transforms(folder: Path) -> None:
 
 
 def test_one_number_scales_every_axis(folder: Path) -> None:
-    mesh, = load(write(folder, '[[mesh]]\nfile = "models/triangle.obj"\nscale = 3\n')).meshes
+    (mesh,) = load(write(folder, '[[mesh]]\nfile = "models/triangle.obj"\nscale = 3\n')).meshes
     np.testing.assert_array_equal(mesh.vertices, [[0, 0, 0], [3, 0, 0], [0, 3, 0]])
 
 
 def test_instances_start_from_where_their_mesh_stands(folder: Path) -> None:
     """Each shows every mesh of its table, which itself may be hidden; an inline table works, too."""
     (folder / "models" / "two.obj").write_text(
-        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl green\nf 1 3 2\n")
-    scene = load(write(folder, """
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl green\nf 1 3 2\n"
+    )
+    scene = load(
+        write(
+            folder,
+            """
 instance = [{ mesh = "pair", translate = [0, 5, 0], scale = -2 }, { mesh = "one", material = "red", name = "other" }]
 [materials.red]
 type = "diffuse"
@@ -134,8 +143,10 @@ visible = false
 [[mesh]]
 name = "one"
 file = "models/triangle.obj"
-"""))
-    one, = scene.meshes
+""",
+        )
+    )
+    (one,) = scene.meshes
     *pair, other = scene.instances
     assert other.mesh is one and other.material == Diffuse(color=(1, 0, 0)) and other.name == "other"
     np.testing.assert_array_equal(other.to_world, np.eye(3, 4))
@@ -148,6 +159,7 @@ file = "models/triangle.obj"
 def test_environment_picture_keeps_its_orientation(folder: Path) -> None:
     """Row 0 of the file is row 0 of the image, and values are unchanged."""
     import OpenImageIO as oiio
+
     pixels = np.arange(2 * 4 * 3, dtype=np.float32).reshape(2, 4, 3) * 100
     picture = oiio.ImageBuf(oiio.ImageSpec(4, 2, 3, oiio.FLOAT))
     assert picture.set_pixels(oiio.ROI(), pixels) and picture.write(str(folder / "sky.exr"))
@@ -185,10 +197,17 @@ def test_a_model_shows_its_own_camera(tmp_path: Path) -> None:
     assert camera.position == (0.0, 0.0, 4.0) and camera.fov_degrees == pytest.approx(math.degrees(1))
 
 
-@pytest.mark.parametrize("name, sentence", [("a.toml", "no such scene file"), (".", "is a folder, not a scene"),
-                                            ("a.obj", "no such model file"), ("loop.toml", "no such scene file"),
-                                            ("pipe.toml", "is a device, a pipe or a socket, not a scene"),
-                                            ("a.blend", "a scene must be one of .toml, .xml, .glb")])
+@pytest.mark.parametrize(
+    "name, sentence",
+    [
+        ("a.toml", "no such scene file"),
+        (".", "is a folder, not a scene"),
+        ("a.obj", "no such model file"),
+        ("loop.toml", "no such scene file"),
+        ("pipe.toml", "is a device, a pipe or a socket, not a scene"),
+        ("a.blend", "a scene must be one of .toml, .xml, .glb"),
+    ],
+)
 def test_files_that_are_no_scene(name: str, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "a.blend").touch()
     (tmp_path / "loop.toml").symlink_to("loop.toml")
@@ -199,8 +218,10 @@ def test_files_that_are_no_scene(name: str, sentence: str, tmp_path: Path) -> No
 
 def test_scenes_load_without_opencl(folder: Path) -> None:
     """In a fresh interpreter where importing pyopencl fails."""
-    code = ("import sys; sys.modules['pyopencl'] = None; from clrt.formats.load_scene import load; "
-            "print(len(load(sys.argv[1]).meshes))")
+    code = (
+        "import sys; sys.modules['pyopencl'] = None; from clrt.formats.load_scene import load; "
+        "print(len(load(sys.argv[1]).meshes))"
+    )
     path = write(folder, GOOD)
     done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
     assert done.stdout == "3\n"
@@ -244,7 +265,10 @@ intensity = [{0}, 0, 0]
 
 def test_instances_repeat_by_steps_of_the_world(folder: Path) -> None:
     """Copy i is the first one transformed by i steps: here a ring, and rings above it, each twice as large."""
-    scene = load(write(folder, """
+    scene = load(
+        write(
+            folder,
+            """
 instance = [{ mesh = "one", translate = [1, 0, 0], repeat = [
     { count = 4, rotate_degrees = [0, 90, 0] }, { count = 3, scale = 2, translate = [0, 1, 0] }] }]
 [[mesh]]
@@ -252,9 +276,14 @@ name = "one"
 vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 faces = [[0, 1, 2]]
 visible = false
-"""))
+""",
+        )
+    )
     places = [each.to_world[:, 3] for each in scene.instances]
-    expected = [(size * x, height, size * z) for size, height in ((1, 0), (2, 1), (4, 3))
-                for x, z in ((1, 0), (0, -1), (-1, 0), (0, 1))]
+    expected = [
+        (size * x, height, size * z)
+        for size, height in ((1, 0), (2, 1), (4, 3))
+        for x, z in ((1, 0), (0, -1), (-1, 0), (0, 1))
+    ]
     np.testing.assert_allclose(places, expected, atol=1e-12)
     np.testing.assert_allclose(scene.instances[-1].to_world[:, :3], [[0, 0, -4], [0, 4, 0], [4, 0, 0]], atol=1e-12)

@@ -27,7 +27,8 @@ from .test_gltf import cameras
 
 SCENES = Path(__file__).parents[2] / "scenes"
 OBJ = "mtllib a.mtl\nv 0 0 0\nv 1 0 0.1\nv 0 0.7 0\nf 1 2 3\n" + "".join(
-    f"usemtl {name}\nf 1 2 3\n" for name in ("red", 'odd "name" \\ # é', "lost", "model", "lamp"))
+    f"usemtl {name}\nf 1 2 3\n" for name in ("red", 'odd "name" \\ # é', "lost", "model", "lamp")
+)
 MTL = """newmtl red
 Kd 0.9 0.1 0.05
 newmtl odd "name" \\ # é
@@ -44,8 +45,11 @@ Ke 1e-7 12 1e20
 def shaded() -> Gltf:
     """Return four balls: two materials with one name, one without a material, and one without a material name."""
     gltf = ball()
-    gltf.document["materials"] = [{"name": "twin", "pbrMetallicRoughness": {"metallicFactor": 0.1}}, {"name": "twin"},
-                                  {"pbrMetallicRoughness": {"roughnessFactor": 1 / 3}, "emissiveFactor": [1, 0, 0]}]
+    gltf.document["materials"] = [
+        {"name": "twin", "pbrMetallicRoughness": {"metallicFactor": 0.1}},
+        {"name": "twin"},
+        {"pbrMetallicRoughness": {"roughnessFactor": 1 / 3}, "emissiveFactor": [1, 0, 0]},
+    ]
     primitive = gltf.document["meshes"][0]["primitives"][0]
     for material in (0, 1, 2):
         gltf.mesh(**primitive, material=material)
@@ -91,14 +95,16 @@ def test_some_of_a_file_s_materials_are_replaced(tmp_path: Path) -> None:
     assert caught.value.problems == [
         f"{scene}: mesh[0]: has both a material and materials; keep one of them",
         f'{scene}: mesh[0].materials: "read" is unknown; did you mean "red"?',
-        f'{scene}: mesh[0].materials.red: "whit" is unknown; did you mean "white"?']
+        f'{scene}: mesh[0].materials.red: "whit" is unknown; did you mean "white"?',
+    ]
     scene.write_text(head + "materials = 3\n[environment]\nsky = 1\ncolor = [1, 1, 1]\n")
     with pytest.raises(SceneError) as caught:
         load(scene)
     assert caught.value.problems == [
         f'{scene}: environment.sky: 1 is unknown; write "default"',
         f"{scene}: environment: has both a sky and color; keep one of them",
-        f'{scene}: mesh[0].materials: 3 is not a table; write {{ "name in the file" = "NAME" }}']
+        f'{scene}: mesh[0].materials: 3 is not a table; write {{ "name in the file" = "NAME" }}',
+    ]
 
 
 def edited(scene: Scene) -> Scene:
@@ -106,14 +112,18 @@ def edited(scene: Scene) -> Scene:
     materials = list(materials_of(scene).values())
     for material in materials[:2]:
         scene = with_material(scene, material, replace(material, emission=(0.125, 1 / 3, 2.0)))
-    ball = Sphere(center=(0.1, 0.2, 0.3), material=Dielectric(ior=1.25), name="a \"ball\"")
+    ball = Sphere(center=(0.1, 0.2, 0.3), material=Dielectric(ior=1.25), name='a "ball"')
     keyframes = Keyframe(time=0.5, position=(1.0, 2.0, 3.0)), Keyframe(time=2.0, fov_degrees=12.5)
-    return replace(scene, animation=Animation(fps=12.5, keyframes=keyframes),
-                   spheres=[*scene.spheres, ball], camera=replace(scene.camera, fov_degrees=33.3),
-                   cameras={**scene.cameras, "from the side": Camera(position=(9.0, 1.0, 0.0))},
-                   environment=replace(scene.environment, strength=0.3),
-                   lights=[*scene.lights, PointLight(position=(1.0, 2.0, 3.0), intensity=(1.0, 0.0, 1e-7))],
-                   render=replace(scene.render, integrator="direct", seed=7))
+    return replace(
+        scene,
+        animation=Animation(fps=12.5, keyframes=keyframes),
+        spheres=[*scene.spheres, ball],
+        camera=replace(scene.camera, fov_degrees=33.3),
+        cameras={**scene.cameras, "from the side": Camera(position=(9.0, 1.0, 0.0))},
+        environment=replace(scene.environment, strength=0.3),
+        lights=[*scene.lights, PointLight(position=(1.0, 2.0, 3.0), intensity=(1.0, 0.0, 1e-7))],
+        render=replace(scene.render, integrator="direct", seed=7),
+    )
 
 
 def again(scene: Scene, path: Path) -> Scene:
@@ -168,20 +178,35 @@ def test_what_no_scene_file_can_say_is_written_beside_it(tmp_path: Path) -> None
     faces = np.array([[0, 1, 2]], np.int32)
     picture = Picture(rng.integers(0, 256, (3, 5, 4), np.uint8), "some/wood")
     wood = Diffuse(color=Texture(picture=picture, scale=(2.0, 3.0), wrap=("mirror", "clamp"), factor=0.7))
-    mesh = Mesh(rng.random((3, 3), np.float32), faces, wood, normals=directions, name="all of it",
-                tangents=np.column_stack([directions[[1, 2, 0]], np.ones(3, np.float32)]),
-                uv=rng.random((3, 2), np.float32), uv1=rng.random((3, 2), np.float32),
-                colors=rng.random((3, 4), np.float32))
+    mesh = Mesh(
+        rng.random((3, 3), np.float32),
+        faces,
+        wood,
+        normals=directions,
+        name="all of it",
+        tangents=np.column_stack([directions[[1, 2, 0]], np.ones(3, np.float32)]),
+        uv=rng.random((3, 2), np.float32),
+        uv1=rng.random((3, 2), np.float32),
+        colors=rng.random((3, 4), np.float32),
+    )
     coated = MetallicRoughness(clearcoat=0.5, clearcoat_normal_map=Texture(picture=picture, factor=0.25))
     hidden = Mesh(rng.random((3, 3), np.float32), faces, Mirror(), name="all of it")
     places = [rng.random((3, 4)) for _ in range(2)]
-    scene = Scene(meshes=[mesh], spheres=[Sphere(material=coated)],
-                  instances=[Instance(hidden, place, name=f"{i}") for i, place in enumerate(places)],
-                  environment=Environment(image=rng.random((4, 8, 3), np.float32)))
+    scene = Scene(
+        meshes=[mesh],
+        spheres=[Sphere(material=coated)],
+        instances=[Instance(hidden, place, name=f"{i}") for i, place in enumerate(places)],
+        environment=Environment(image=rng.random((4, 8, 3), np.float32)),
+    )
     written = again(scene, tmp_path / "scene.toml")
     check_same(scene, written)
     assert {path.name for path in tmp_path.iterdir()} == {
-        "scene.toml", "scene.all_of_it.glb", "scene.all_of_it_2.glb", "scene.some_wood.png", "scene.sky.exr"}
+        "scene.toml",
+        "scene.all_of_it.glb",
+        "scene.all_of_it_2.glb",
+        "scene.some_wood.png",
+        "scene.sky.exr",
+    }
     check_same(written, again(written, tmp_path / "again.toml"))
 
 
@@ -206,9 +231,11 @@ def test_files_that_are_still_shown_stay(tmp_path: Path) -> None:
 
 def test_numbers_of_numpy_are_written(tmp_path: Path) -> None:
     center = tuple(np.array([1.5, 2, 3]))
-    scene = Scene(spheres=[Sphere(center=center)],
-                  render=RenderSettings(spp=np.int64(7)),  # type: ignore[arg-type]
-                  environment=Environment(strength=np.float32(2.5)))  # type: ignore[arg-type]
+    scene = Scene(
+        spheres=[Sphere(center=center)],
+        render=RenderSettings(spp=np.int64(7)),  # type: ignore[arg-type]
+        environment=Environment(strength=np.float32(2.5)),  # type: ignore[arg-type]
+    )
     save_scene(scene, tmp_path / "a.toml")
     again = load(tmp_path / "a.toml")
     assert (again.spheres[0].center, again.render.spp, again.environment.strength) == ((1.5, 2, 3), 7, 2.5)

@@ -38,17 +38,22 @@ def room() -> Scene:
     vertices, faces = icosphere(2)
     floor = quad([(-4, -1, 4), (4, -1, 4), (4, -1, -4), (-4, -1, -4)], Diffuse(color=(0.7, 0.6, 0.5)))
     sky = np.random.default_rng(0).random((4, 8, 3), np.float32)
-    return Scene(meshes=[floor, Mesh(vertices * np.float32(0.7), faces, Diffuse(color=(0.2, 0.5, 0.8)))],
-                 spheres=[Sphere(center=(1.2, 0, 0), radius=0.4, material=Mirror()),
-                          Sphere(center=(0, 2, 0), radius=0.2, material=Diffuse(emission=(9.0, 9.0, 9.0)))],
-                 lights=[PointLight(position=(2.0, 2.0, 2.0), intensity=(5.0, 5.0, 5.0))],
-                 environment=Environment(image=sky), camera=Camera(position=(0.0, 1.0, 5.0)),
-                 render=RenderSettings(size=(40, 30), spp=SPP, max_depth=4))
+    return Scene(
+        meshes=[floor, Mesh(vertices * np.float32(0.7), faces, Diffuse(color=(0.2, 0.5, 0.8)))],
+        spheres=[
+            Sphere(center=(1.2, 0, 0), radius=0.4, material=Mirror()),
+            Sphere(center=(0, 2, 0), radius=0.2, material=Diffuse(emission=(9.0, 9.0, 9.0))),
+        ],
+        lights=[PointLight(position=(2.0, 2.0, 2.0), intensity=(5.0, 5.0, 5.0))],
+        environment=Environment(image=sky),
+        camera=Camera(position=(0.0, 1.0, 5.0)),
+        render=RenderSettings(size=(40, 30), spp=SPP, max_depth=4),
+    )
 
 
 @pytest.fixture
 def live(device: Device) -> Iterator[Live]:
-    contexts.share_no_more()    # a context worn out by other tests would be replaced midway
+    contexts.share_no_more()  # a context worn out by other tests would be replaced midway
     with Live(room(), device=device.info.index) as live:
         yield live
 
@@ -167,7 +172,7 @@ def test_mistakes_are_told_and_the_last_picture_stays(live: Live, device: Device
 
 def test_after_many_programs_the_device_is_opened_anew(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """The old context must be released completely first: PoCL's compiler is shared by all contexts."""
-    contexts.share_no_more()    # the tests' own device is in use
+    contexts.share_no_more()  # the tests' own device is in use
     with Live(room(), device=device.info.index) as live:
         whole(live)
         before = weakref.ref(live._renderer._devices[0].shared)
@@ -201,10 +206,10 @@ def test_steps_are_undone_and_what_is_no_step_stays() -> None:
         history.record(scene, after, goes_on)
         return after
 
-    for x in (1.0, 2.0, 3.0):   # a dragged value
+    for x in (1.0, 2.0, 3.0):  # a dragged value
         scene = step(replace(scene, spheres=[replace(scene.spheres[0], radius=x)]), goes_on=x < 3)
     scene = step(replace(scene, lights=[]))
-    scene = moved(scene)        # a camera movement
+    scene = moved(scene)  # a camera movement
     before = history.undo(scene)
     assert before.lights is first.lights and before.spheres is scene.spheres and before.camera is scene.camera
     assert history.undo(before).spheres is first.spheres and not history.can_undo

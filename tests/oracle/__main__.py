@@ -27,10 +27,12 @@ def main() -> int:
         found.append(verdict(device, random_scene(given.seed, number), given.seed))
         print(found[-1], "  OFF" if found[-1].is_off(given.scenes) else "", flush=True)
     off = [each for each in found if each.is_off(given.scenes)]
-    weights = np.array([1 / max(each.error, 1e-4)**2 for each in found])
+    weights = np.array([1 / max(each.error, 1e-4) ** 2 for each in found])
     ratio = np.average([each.ratio for each in found], weights=weights)
-    print(f"{len(off)} of {len(found)} random scenes off; mean {ratio:.5f} ± {weights.sum()**-0.5:.5f} of the oracle's;"
-          f" {time.perf_counter() - start:.0f} s")
+    print(
+        f"{len(off)} of {len(found)} random scenes off; mean {ratio:.5f} ± {weights.sum() ** -0.5:.5f} of the oracle's;"
+        f" {time.perf_counter() - start:.0f} s"
+    )
     return bool(off)
 
 

@@ -9,8 +9,9 @@ from clrt.scene.model import Camera
 from .vectors import Doubles, unit
 
 
-def camera_rays(camera: Camera, size: tuple[int, int], pixel: Doubles,
-                rng: np.random.Generator) -> tuple[Doubles, Doubles]:
+def camera_rays(
+    camera: Camera, size: tuple[int, int], pixel: Doubles, rng: np.random.Generator
+) -> tuple[Doubles, Doubles]:
     """Return origins and unit directions (n, 3) through points (n, 2) of an image of `size` (width, height), in
     pixels from its upper left corner."""
     width, height = size
@@ -20,7 +21,7 @@ def camera_rays(camera: Camera, size: tuple[int, int], pixel: Doubles,
     forward = ahead / distance
     right = unit(np.cross(forward, np.array(camera.up, float)))
     up = np.cross(right, forward)
-    x, y = (pixel / size).T[..., None]      # from 0 to 1, down
+    x, y = (pixel / size).T[..., None]  # from 0 to 1, down
     if camera.projection == "equirectangular":
         # As an environment map, for a view along +Z: forward in the middle, backward at the left edge.
         longitude, polar = 2 * np.pi * (x - 0.5), np.pi * y

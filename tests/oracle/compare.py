@@ -66,8 +66,10 @@ class Verdict:
         return self.rounds == len(ROUNDS) and corrected(self.p, scenes) < FAMILY
 
     def __str__(self) -> str:
-        return (f"{self.name}: {self.rounds} rounds, p {self.p:.2g}, largest difference {self.difference:+.2%}, "
-                f"mean {self.ratio:.4f} ± {self.error:.4f}")
+        return (
+            f"{self.name}: {self.rounds} rounds, p {self.p:.2g}, largest difference {self.difference:+.2%}, "
+            f"mean {self.ratio:.4f} ± {self.error:.4f}"
+        )
 
 
 def verdict(device: Device, scene: Scene, seed: int = 0) -> Verdict:
@@ -77,8 +79,9 @@ def verdict(device: Device, scene: Scene, seed: int = 0) -> Verdict:
     for count, each in enumerate(ROUNDS, start=1):
         oracle, brightest = _oracle(paths, each, rng)
         images = (_image(session, scene, seed + first + i, each.spp) for i in range(each.batches))
-        found = _compared(np.array([_means(image) for image in images]), oracle,
-                          brightest / (each.batches * each.oracle_spp))
+        found = _compared(
+            np.array([_means(image) for image in images]), oracle, brightest / (each.batches * each.oracle_spp)
+        )
         first += each.batches
         if found[0] >= each.suspect:
             break
@@ -126,11 +129,10 @@ def _compared(images: Doubles, oracle: Doubles, resolution: float) -> tuple[floa
     level, difference = oracle.mean(0), images.mean(0) - oracle.mean(0)
     variances = [means.var(0, ddof=1) / len(means) for means in (images, oracle)]
     pixels = np.append(np.full(len(level) - 3, BLOCK**2), np.full(3, SIZE[0] * SIZE[1]))
-    error = np.sqrt(variances[0] + variances[1] + (ROUNDING * level)**2 + (resolution / pixels)**2)
+    error = np.sqrt(variances[0] + variances[1] + (ROUNDING * level) ** 2 + (resolution / pixels) ** 2)
     lit = error > 0
     # Welch–Satterthwaite degrees of freedom.
-    freedom = (variances[0] + variances[1])**2 / np.maximum(
-        sum(v**2 / (len(images) - 1) for v in variances), 1e-300)
+    freedom = (variances[0] + variances[1]) ** 2 / np.maximum(sum(v**2 / (len(images) - 1) for v in variances), 1e-300)
     p = np.array([t_test(t, max(f, 1.0)) for t, f in zip(difference[lit] / error[lit], freedom[lit])])
     if not p.size:
         return 1.0, 0.0, 1.0, 0.0

@@ -31,8 +31,13 @@ class Corners:
         Normals transform by the inverse transpose."""
         linear = to_world[:, :3]
         normals = None if mesh.normals is None else unit(mesh.normals.astype(float) @ np.linalg.inv(linear))
-        rows = [mesh.vertices.astype(float) @ linear.T + to_world[:, 3], _rows(mesh, normals, 3, 0.0),
-                _rows(mesh, mesh.uv, 2, 0.0), _rows(mesh, mesh.uv1, 2, 0.0), _rows(mesh, mesh.colors, 4, 1.0)]
+        rows = [
+            mesh.vertices.astype(float) @ linear.T + to_world[:, 3],
+            _rows(mesh, normals, 3, 0.0),
+            _rows(mesh, mesh.uv, 2, 0.0),
+            _rows(mesh, mesh.uv1, 2, 0.0),
+            _rows(mesh, mesh.colors, 4, 1.0),
+        ]
         faces = mesh.faces[:, ::-1] if np.linalg.det(linear) < 0 else mesh.faces
         return Corners(*(each[faces] for each in rows))
 
@@ -47,5 +52,5 @@ def _rows(mesh: Mesh, values: ArrayLike | None, size: int, missing: float) -> Do
     rows = np.full((len(mesh.vertices), size), missing)
     if values is not None:
         given = np.asarray(values, float)
-        rows[:, :given.shape[1]] = given
+        rows[:, : given.shape[1]] = given
     return rows

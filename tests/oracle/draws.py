@@ -60,10 +60,17 @@ class Draws:
         """Return a texture with random texels and a random transform."""
         texels = self._numbers.integers(lowest, 256, (TEXELS, TEXELS, 4), np.uint8)
         wrap: tuple[Wrap, Wrap] = self.one_of(get_args(Wrap)), self.one_of(get_args(Wrap))
-        return Texture(picture=Picture(texels), factor=factor, channel=self.one_of(get_args(Channel)), wrap=wrap,
-                       uv_set=self.one_of((0, 1)), offset=(self.between(-1, 1), self.between(-1, 1)),
-                       scale=(self.between(-2, 2), self.between(0.5, 2)), rotation_degrees=self.between(-180, 180),
-                       filter=self.one_of(("linear", "nearest")))
+        return Texture(
+            picture=Picture(texels),
+            factor=factor,
+            channel=self.one_of(get_args(Channel)),
+            wrap=wrap,
+            uv_set=self.one_of((0, 1)),
+            offset=(self.between(-1, 1), self.between(-1, 1)),
+            scale=(self.between(-2, 2), self.between(0.5, 2)),
+            rotation_degrees=self.between(-180, 180),
+            filter=self.one_of(("linear", "nearest")),
+        )
 
     def color(self, low: float = 0.1, high: float = 0.95) -> Color | Texture:
         """Return a random color, or a texture in a fifth of the cases."""
@@ -111,8 +118,12 @@ def _conductor(draws: Draws) -> dict[str, Any]:
 
 def _metallic_roughness(draws: Draws) -> dict[str, Any]:
     given: dict[str, Any] = {
-        "color": draws.color(), "roughness": draws.number(SMOOTHEST), "ior": draws.between(1.0, 2.5),
-        "metallic": draws.one_of((0.0, 1.0, draws.number(0.0))), "smith": draws.one_of(get_args(Smith))}
+        "color": draws.color(),
+        "roughness": draws.number(SMOOTHEST),
+        "ior": draws.between(1.0, 2.5),
+        "metallic": draws.one_of((0.0, 1.0, draws.number(0.0))),
+        "smith": draws.one_of(get_args(Smith)),
+    }
     if draws.chance(0.3):
         given |= {"specular": draws.number(0.0), "specular_color": draws.color(0.2, 2.0)}
     given |= _layers(draws)
@@ -137,5 +148,11 @@ def _phong(draws: Draws) -> dict[str, Any]:
 
 
 DRAWERS: dict[type[Material], Callable[[Draws], dict[str, Any]]] = {
-    Diffuse: _diffuse, Mirror: _mirror, Dielectric: _dielectric, Conductor: _conductor,
-    MetallicRoughness: _metallic_roughness, Phong: _phong, BlinnPhong: _phong}
+    Diffuse: _diffuse,
+    Mirror: _mirror,
+    Dielectric: _dielectric,
+    Conductor: _conductor,
+    MetallicRoughness: _metallic_roughness,
+    Phong: _phong,
+    BlinnPhong: _phong,
+}

@@ -22,7 +22,7 @@ def escaped(scene: Scene, direction: Doubles) -> Doubles:
         if isinstance(light, DirectionalLight) and light.angle_degrees >= POINT:
             half = np.radians(light.angle_degrees) / 2
             within = direction @ -unit(np.array(light.direction, float)) > np.cos(half)
-            radiance += within[:, None] * np.array(light.irradiance) / (np.pi * np.sin(half)**2)
+            radiance += within[:, None] * np.array(light.irradiance) / (np.pi * np.sin(half) ** 2)
     return radiance
 
 
@@ -44,19 +44,19 @@ def arriving(light: Known, p: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     towards = away / distance[:, None]
     strength = _falloff(light, towards) / distance**2
     if light.range is not None:
-        strength = strength * np.maximum(1 - (distance / light.range)**4, 0)
+        strength = strength * np.maximum(1 - (distance / light.range) ** 4, 0)
     intensity: Doubles = np.array(light.intensity, float)
     return towards, distance, strength[:, None] * intensity
 
 
 def _falloff(light: PointLight | SpotLight, towards: Doubles) -> Doubles:
-    """Return KHR_lights_punctual's falloff: the square of a ramp linear in the cosine from the inner to the outer cone.
-    """
+    """Return KHR_lights_punctual's falloff: the square of a ramp linear in the cosine from the inner to the outer
+    cone."""
     if isinstance(light, PointLight):
         return np.ones(len(towards))
     inner, outer = np.cos(np.radians([light.inner_degrees, light.outer_degrees]))
     cosine = -dot(towards, unit(np.array(light.direction, float)))
-    return np.asarray(np.clip((cosine - outer) / (inner - outer), 0, 1)**2)
+    return np.asarray(np.clip((cosine - outer) / (inner - outer), 0, 1) ** 2)
 
 
 def _environment(environment: Environment, direction: Doubles) -> Doubles:

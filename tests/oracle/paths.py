@@ -78,10 +78,9 @@ class Paths:
             rays = Rays.joined(beyond)
         return light
 
-    def _scattered(self, rays: Rays, at: Surface, material: Material,
-                   rng: np.random.Generator) -> tuple[Doubles, Rays]:
-        """Return radiance (n, 3) from delta lights to the camera, and the next segments, of rays that hit one material.
-        """
+    def _scattered(self, rays: Rays, at: Surface, material: Material, rng: np.random.Generator) -> tuple[Doubles, Rays]:
+        """Return radiance (n, 3) from delta lights to the camera, and the next segments, of rays that hit one
+        material."""
         scattering, frame = scattering_of(material, at), Frame(at.shading_normal)
         wo = frame.to_local(-rays.direction)
         inside = rays.absorption if scattering.absorption_beyond is None else scattering.absorption_beyond

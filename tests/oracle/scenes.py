@@ -59,9 +59,12 @@ class _Stage:
     def scene(self, name: str) -> Scene:
         draws = self.draws
         kinds = [draws.one_of(DRAWERS), draws.one_of(DRAWERS), Diffuse]
-        self._sheet(random_material(draws, draws.one_of(kinds), opaque=True), scaling((3, 1, 3)),
-                    translation((0, draws.between(-0.1, 0.1), 0)))
-        for x, z in PLACES[:draws.one_of((2, 3, 4))]:
+        self._sheet(
+            random_material(draws, draws.one_of(kinds), opaque=True),
+            scaling((3, 1, 3)),
+            translation((0, draws.between(-0.1, 0.1), 0)),
+        )
+        for x, z in PLACES[: draws.one_of((2, 3, 4))]:
             size = draws.between(0.4, 0.8)
             middle = x + draws.between(-0.3, 0.3), draws.between(0.7, 1.5) * size, z + draws.between(-0.3, 0.3)
             upright = rotation((90.0, draws.between(-180, 180), 0.0))
@@ -69,9 +72,16 @@ class _Stage:
         for _ in range(draws.one_of((1, 2, 3))):
             self._add_light(draws.one_of(LIGHTS), kinds)
         settings = RenderSettings(size=SIZE, max_depth=draws.one_of((2, 4, 6)))
-        return Scene(meshes=self.meshes, instances=self.instances, spheres=self.spheres, lights=[*self.lights],
-                     environment=self._environment(draws.one_of(SKIES)), camera=self._camera(), render=settings,
-                     name=name)
+        return Scene(
+            meshes=self.meshes,
+            instances=self.instances,
+            spheres=self.spheres,
+            lights=[*self.lights],
+            environment=self._environment(draws.one_of(SKIES)),
+            camera=self._camera(),
+            render=settings,
+            name=name,
+        )
 
     def _add_light(self, kind: str, kinds: list[type[Material]]) -> None:
         """Add a light above the objects; a flat one faces down."""
@@ -82,14 +92,20 @@ class _Stage:
         if kind in EMITTERS:
             strength = draws.between(3.0, 8.0)
             emission = strength * red, strength * green, strength * blue
-            material = replace(random_material(draws, draws.one_of(kinds), opaque=draws.chance(0.7)),
-                               emission=draws.texture(emission) if draws.chance(0.3) else emission)
+            material = replace(
+                random_material(draws, draws.one_of(kinds), opaque=draws.chance(0.7)),
+                emission=draws.texture(emission) if draws.chance(0.3) else emission,
+            )
             self._add(kind, material, (x, y, z), draws.between(0.6, 0.9), rotation((180.0, 0.0, 0.0)))
         elif kind in ("disc", "directional"):
             strength = draws.between(1.0, 3.0)
-            self.lights.append(DirectionalLight(
-                direction=direction, irradiance=(strength * red, strength * green, strength * blue),
-                angle_degrees=draws.between(20, 120) if kind == "disc" else 0.0))
+            self.lights.append(
+                DirectionalLight(
+                    direction=direction,
+                    irradiance=(strength * red, strength * green, strength * blue),
+                    angle_degrees=draws.between(20, 120) if kind == "disc" else 0.0,
+                )
+            )
         else:
             strength, reach = draws.between(5.0, 20.0), draws.between(3.0, 8.0) if draws.chance(0.3) else None
             intensity = strength * red, strength * green, strength * blue
@@ -97,8 +113,16 @@ class _Stage:
                 self.lights.append(PointLight(position=(x, y, z), intensity=intensity, range=reach))
                 return
             outer = draws.between(20, 60)
-            self.lights.append(SpotLight(position=(x, y, z), direction=direction, intensity=intensity, range=reach,
-                                         inner_degrees=draws.between(0.0, 0.9) * outer, outer_degrees=outer))
+            self.lights.append(
+                SpotLight(
+                    position=(x, y, z),
+                    direction=direction,
+                    intensity=intensity,
+                    range=reach,
+                    inner_degrees=draws.between(0.0, 0.9) * outer,
+                    outer_degrees=outer,
+                )
+            )
 
     def _add(self, shape: str, material: Material, middle: Vector, size: float, turn: Doubles) -> None:
         """Add an object; turn: the rotation of a flat one before a small random tilt."""
@@ -119,8 +143,10 @@ class _Stage:
             return
         other = random_material(draws, draws.one_of(DRAWERS)) if normals is None and draws.chance(0.3) else None
         mirrored = [scaling((0.7, 0.5, -0.6)), *placed, translation((0.0, 0.5 + size, 0.0))]
-        self.instances += [Instance(solid, _product(scaling((0.8, 1.0, 0.6)), *placed)),
-                           Instance(solid, _product(*mirrored), other)]
+        self.instances += [
+            Instance(solid, _product(scaling((0.8, 1.0, 0.6)), *placed)),
+            Instance(solid, _product(*mirrored), other),
+        ]
 
     def _sheet(self, material: Material, *placed: Doubles) -> None:
         """Add a square that faces up, two units wide."""
@@ -154,11 +180,16 @@ class _Stage:
         turn, elevation = draws.between(-pi, pi), draws.between(0.25, 1.0)
         x, y, z = far * sin(turn) * cos(elevation), far * sin(elevation), far * cos(turn) * cos(elevation)
         lens, flat = projection == "perspective" and draws.chance(0.25), projection == "orthographic"
-        return Camera(projection=projection, position=(x, y, z), up=(0.1, 1.0, 0.0),
-                      look_at=(draws.between(-0.4, 0.4), 0.5, draws.between(-0.4, 0.4)),
-                      fov_degrees=draws.between(30, 55), aperture_radius=draws.between(0.02, 0.3) if lens else 0.0,
-                      focus_distance=draws.between(3.0, 6.0) if lens and draws.chance(0.5) else None,
-                      view_height=draws.between(3.0, 5.0) if flat and draws.chance(0.5) else None)
+        return Camera(
+            projection=projection,
+            position=(x, y, z),
+            up=(0.1, 1.0, 0.0),
+            look_at=(draws.between(-0.4, 0.4), 0.5, draws.between(-0.4, 0.4)),
+            fov_degrees=draws.between(30, 55),
+            aperture_radius=draws.between(0.02, 0.3) if lens else 0.0,
+            focus_distance=draws.between(3.0, 6.0) if lens and draws.chance(0.5) else None,
+            view_height=draws.between(3.0, 5.0) if flat and draws.chance(0.5) else None,
+        )
 
 
 def _product(*matrices: Doubles) -> Doubles:

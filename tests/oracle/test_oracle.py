@@ -38,8 +38,9 @@ def test_images_of_random_scenes_agree(device: Device, number: int) -> None:
     seed = todays_seed()
     print(f"seed {seed}")
     found = verdict(device, random_scene(seed, number), seed)
-    assert not found.is_off(len(SCENES)), \
+    assert not found.is_off(len(SCENES)), (
         f"`python -m tests.oracle --seed {seed} --first {number} --scenes 1` compares this again: {found}"
+    )
 
 
 def lamp_over_floor(emission: float) -> Scene:
@@ -47,13 +48,19 @@ def lamp_over_floor(emission: float) -> Scene:
     corners = np.array([(-3, 0, 3), (3, 0, 3), (3, 0, -3), (-3, 0, -3)], np.float32)
     floor = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), Diffuse(color=(0.6, 0.6, 0.6)))
     lamp = Sphere(center=(0.0, 2.0, 0.0), radius=0.8, material=Diffuse(emission=(emission,) * 3))
-    return Scene(meshes=[floor], spheres=[lamp], camera=Camera(position=(0.0, 2.0, 5.0)),
-                 render=RenderSettings(size=SIZE, max_depth=4), name="lamp")
+    return Scene(
+        meshes=[floor],
+        spheres=[lamp],
+        camera=Camera(position=(0.0, 2.0, 5.0)),
+        render=RenderSettings(size=SIZE, max_depth=4),
+        name="lamp",
+    )
 
 
 @pytest.mark.parametrize("share, off", [(1.0, False), (0.95, True)])
-def test_five_percent_too_much_light_is_found(device: Device, monkeypatch: pytest.MonkeyPatch, share: float,
-                                              off: bool) -> None:
+def test_five_percent_too_much_light_is_found(
+    device: Device, monkeypatch: pytest.MonkeyPatch, share: float, off: bool
+) -> None:
     rounds, other = (ROUNDS[0], ROUNDS[0]._replace(suspect=0.0)), Paths(lamp_over_floor(4.0 * share))
     monkeypatch.setattr("tests.oracle.compare.ROUNDS", rounds)
     monkeypatch.setattr("tests.oracle.compare.Paths", lambda _: other)
@@ -78,12 +85,14 @@ def test_directions_are_drawn_by_their_density(kind: type[Material]) -> None:
         uniform = rng.normal(size=wo.shape)
         uniform /= np.linalg.norm(uniform, axis=1, keepdims=True)
         integrand, sample = 4 * np.pi * scattering.evaluate(wo, uniform), scattering.sample(wo, rng)
-        if not integrand.any():      # specular directions
+        if not integrand.any():  # specular directions
             assert sample.weight.max() <= 1 / 0.25**2
             continue
         for up in (True, False):
-            sides = [np.where((wi[:, 2:] > 0) == up, weight, 0) for wi, weight in
-                     ((uniform, integrand), (sample.wi, sample.weight))]
+            sides = [
+                np.where((wi[:, 2:] > 0) == up, weight, 0)
+                for wi, weight in ((uniform, integrand), (sample.wi, sample.weight))
+            ]
             error = np.sqrt(sum(each.var(axis=0) for each in sides) / len(wo))
             assert (abs(sides[0].mean(axis=0) - sides[1].mean(axis=0)) <= 4.5 * error).all(), (material, up)
 
@@ -102,8 +111,8 @@ def test_white_keeps_energy(roughness: float, metallic: float) -> None:
 @pytest.mark.parametrize("roughness", [0.3, 0.8])
 @pytest.mark.parametrize("metallic", [0.0, 0.6, 1.0])
 def test_white_under_layers_keeps_energy(roughness: float, metallic: float, layers: dict[str, Any]) -> None:
-    """Total reflection and transmission is 1, by quadrature in √cos and the root of the azimuth from the mirrored wo.
-    """
+    """Total reflection and transmission is 1, by quadrature in √cos and the root of the azimuth from the mirrored
+    wo."""
     white = MetallicRoughness(color=(1.0, 1.0, 1.0), roughness=roughness, metallic=metallic, **layers)
     x, weights = np.polynomial.legendre.leggauss(64)
     u = (x + 1) / 2
@@ -136,8 +145,9 @@ def view(cosine: float, n: int) -> tuple[Doubles, Surface]:
     """Return a direction, n times, and a surface that it leaves."""
     wo, up = np.array([np.sqrt(1 - cosine**2), 0.0, cosine]), np.array([0.0, 0.0, 1.0])
     rows = np.tile(up, (n, 1))
-    return np.tile(wo, (n, 1)), Surface(np.zeros((n, 3)), rows, rows.copy(), np.ones(n, bool), np.full((n, 2, 2), 0.3),
-                                        np.ones((n, 4)))
+    return np.tile(wo, (n, 1)), Surface(
+        np.zeros((n, 3)), rows, rows.copy(), np.ones(n, bool), np.full((n, 2, 2), 0.3), np.ones((n, 4))
+    )
 
 
 def test_scenes_are_valid_and_share_programs(device: Device) -> None:

@@ -59,4 +59,4 @@ def _wrapped(cell: Whole, size: int, wrap: str) -> Whole:
 
 def _linear(srgb: Doubles) -> Doubles:
     """Decode sRGB by IEC 61966-2-1."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055)**2.4)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

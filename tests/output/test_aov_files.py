@@ -64,8 +64,20 @@ def test_an_exr_has_all_layers_and_what_made_them(tmp_path: Path) -> None:
         assert channels[name].dtype == np.float32
         np.testing.assert_array_equal(channels[name], values, name)
     assert set(channels["object.X"].ravel()) == {-1, 0} and np.isinf(channels["depth.Z"]).any()
-    for name in ("scene", "scene_hash", "device", "version", "spp", "seconds", "seed", "max_depth", "integrator",
-                 "sampler", "filter", "adaptive"):
+    for name in (
+        "scene",
+        "scene_hash",
+        "device",
+        "version",
+        "spp",
+        "seconds",
+        "seed",
+        "max_depth",
+        "integrator",
+        "sampler",
+        "filter",
+        "adaptive",
+    ):
         assert header[f"clrt:{name}"] == str(image.report[name])
     assert np.array_equal(read_image(tmp_path / "all.exr"), image.pixels)
 
@@ -99,11 +111,19 @@ def test_a_denoised_picture_has_them_and_the_raw_one_not(tmp_path: Path) -> None
     assert set(layers(tmp_path / "a.exr")[1]) == {*"RGB", "direct.R", "direct.G", "direct.B"}
 
 
-@pytest.mark.parametrize("arguments, message", [
-    (["--aov", "dept"], "AOV 'dept' is unknown; choose from albedo, .*did you mean depth"),
-    (["--aov", "depth", "-o", "a.hdr"], "an .hdr file, a video .* cannot store AOVs"),
-    (["--aov", "depth", "-o", "a.png", "--reference", "a.depth.png"], "a.depth.png: is both the reference and an AOV"),
-    (["--aov", "depth", "-o", "a.png", "-o", "a.depth.png"], "a.depth.png: is both an image .* an AOV")], ids=str)
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["--aov", "dept"], "AOV 'dept' is unknown; choose from albedo, .*did you mean depth"),
+        (["--aov", "depth", "-o", "a.hdr"], "an .hdr file, a video .* cannot store AOVs"),
+        (
+            ["--aov", "depth", "-o", "a.png", "--reference", "a.depth.png"],
+            "a.depth.png: is both the reference and an AOV",
+        ),
+        (["--aov", "depth", "-o", "a.png", "-o", "a.depth.png"], "a.depth.png: is both an image .* an AOV"),
+    ],
+    ids=str,
+)
 def test_mistakes(tmp_path: Path, arguments: list[str], message: str) -> None:
     result = run(tmp_path, *arguments)
     assert result.returncode == 2 and len(result.stderr.splitlines()) == 1

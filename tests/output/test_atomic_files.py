@@ -48,7 +48,7 @@ def test_any_part_may_be_missing(tmp_path: Path, suffix: str, size: tuple[int, i
 
     def write(values: NDArray[np.float32]) -> None:
         if by_rows:
-            write_rows(path, size[::-1], (values[i:i + BLOCK_ROWS] for i in range(0, len(values), BLOCK_ROWS)))
+            write_rows(path, size[::-1], (values[i : i + BLOCK_ROWS] for i in range(0, len(values), BLOCK_ROWS)))
         else:
             write_image(path, values)
 

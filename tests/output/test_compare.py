@@ -38,8 +38,15 @@ def test_measures_of_two_pixels() -> None:
 @needs_flip
 def test_a_picture_equals_itself() -> None:
     image = np.random.default_rng(0).random((16, 16, 3), dtype=np.float32)
-    assert compare(image, image) == {"relmse": 0, "rmse": 0, "mean_ratio": [1, 1, 1], "flip": 0, "max_abs": 0,
-                                     "nonfinite": 0, "nonfinite_reference": 0}
+    assert compare(image, image) == {
+        "relmse": 0,
+        "rmse": 0,
+        "mean_ratio": [1, 1, 1],
+        "flip": 0,
+        "max_abs": 0,
+        "nonfinite": 0,
+        "nonfinite_reference": 0,
+    }
 
 
 def test_a_black_reference_has_no_ratio() -> None:
@@ -91,13 +98,17 @@ def flip_of_colors(x: Floats64, r: Floats64) -> float:
 
     Filters and features have no effect on them, so it is the HyAB distance in Hunt-adjusted L*a*b*, redistributed.
     """
-    to_xyz = np.array([[0.41239079926595934, 0.357584339383878, 0.1804807884018343],
-                       [0.21263900587151027, 0.715168678767756, 0.07219231536073371],
-                       [0.01933081871559182, 0.11919477979462598, 0.9505321522496607]])
+    to_xyz = np.array(
+        [
+            [0.41239079926595934, 0.357584339383878, 0.1804807884018343],
+            [0.21263900587151027, 0.715168678767756, 0.07219231536073371],
+            [0.01933081871559182, 0.11919477979462598, 0.9505321522496607],
+        ]
+    )
 
     def hunt(linear: Floats64) -> Floats64:
         t = to_xyz @ linear / to_xyz.sum(axis=1)
-        f = np.where(t > (6 / 29)**3, np.cbrt(t), t / (3 * (6 / 29)**2) + 4 / 29)
+        f = np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29)
         lightness = 116 * f[1] - 16
         return np.array([lightness, 0.01 * lightness * 500 * (f[0] - f[1]), 0.01 * lightness * 200 * (f[1] - f[2])])
 
@@ -132,8 +143,9 @@ def test_flip_of_even_pictures_has_a_closed_form(image: Color, reference: Color)
 
 
 @needs_flip
-@pytest.mark.parametrize("first, second, hdr", [("a.png", "b.png", False), ("a.exr", "b.png", True),
-                                                ("a.png", "b.hdr", True)])
+@pytest.mark.parametrize(
+    "first, second, hdr", [("a.png", "b.png", False), ("a.exr", "b.png", True), ("a.png", "b.hdr", True)]
+)
 def test_files(tmp_path: Path, first: str, second: str, hdr: bool) -> None:
     rng = np.random.default_rng(1)
     write_image(tmp_path / first, rng.random((16, 16, 3), dtype=np.float32))

@@ -174,8 +174,12 @@ def test_where_the_package_is_missing(tmp_path: Path) -> None:
     (tmp_path / "ball.toml").write_text(SCENE)
     hide = "import sys; sys.modules['pyoidn'] = None; from clrt.cli import main; main(sys.argv[1:])"
     for options, code, written in ((["--denoise"], 2, []), ([], 0, ["ball.png"])):
-        result = subprocess.run([sys.executable, "-c", hide, "render", "ball.toml", "-q", *options],
-                                cwd=tmp_path, capture_output=True, text=True)
+        result = subprocess.run(
+            [sys.executable, "-c", hide, "render", "ball.toml", "-q", *options],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+        )
         assert (result.returncode, result.stdout.split()) == (code, written), result.stderr
         assert sorted(path.name for path in tmp_path.glob("*.png")) == written
         if code:

@@ -73,9 +73,9 @@ def png_samples(path: Path) -> NDArray[np.uint8]:
     data, at, body = path.read_bytes(), 8, b""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     while at < len(data):
-        length, kind = struct.unpack(">I4s", data[at:at + 8])
-        chunk = data[at + 8:at + 8 + length]
-        assert struct.unpack(">I", data[at + 8 + length:at + 12 + length])[0] == zlib.crc32(kind + chunk)
+        length, kind = struct.unpack(">I4s", data[at : at + 8])
+        chunk = data[at + 8 : at + 8 + length]
+        assert struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0] == zlib.crc32(kind + chunk)
         if kind == b"IHDR":
             width, height, *form = struct.unpack(">IIBBBBB", chunk)
             assert form == [8, 2, 0, 0, 0]
@@ -133,7 +133,7 @@ def test_hdr_file_is_radiance(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("extension", ["exr", "png"])
 def test_metadata_survives(tmp_path: Path, extension: str) -> None:
-    metadata = {"clrt:scene": "scenes/café.toml", "clrt:spp": "64", "clrt:device": "pthread-Xeon \"E5\""}
+    metadata = {"clrt:scene": "scenes/café.toml", "clrt:spp": "64", "clrt:device": 'pthread-Xeon "E5"'}
     write_image(tmp_path / f"a.{extension}", noise(), metadata=metadata)
     spec = oiio.ImageBuf(str(tmp_path / f"a.{extension}")).spec()
     assert {name: spec.getattribute(name) for name in metadata} == metadata
@@ -146,15 +146,18 @@ def test_exr_is_compressed_float(tmp_path: Path) -> None:
     assert (tmp_path / "a.exr").stat().st_size < 4096
 
 
-@pytest.mark.parametrize("name, message", [
-    ("picture.pgn", r"picture\.pgn: unknown image format \.pgn; use .*did you mean .*picture\.png\?"),
-    ("picture.xyz", r"unknown image format \.xyz; use \.png, \.exr or \.hdr$"),
-    ("picture", r"the name has no extension; use"),
-    ("missing/deeper/a.png", r"the folder .*missing/deeper does not exist; create it first"),
-    ("folder.png", r"folder\.png: is a folder; choose a file in it"),
-    ("/proc/picture.png", r"/proc/picture\.png: no file can be written in the folder /proc \("),
-    ("file.png/a.png", r"the folder .*file\.png does not exist"),
-])
+@pytest.mark.parametrize(
+    "name, message",
+    [
+        ("picture.pgn", r"picture\.pgn: unknown image format \.pgn; use .*did you mean .*picture\.png\?"),
+        ("picture.xyz", r"unknown image format \.xyz; use \.png, \.exr or \.hdr$"),
+        ("picture", r"the name has no extension; use"),
+        ("missing/deeper/a.png", r"the folder .*missing/deeper does not exist; create it first"),
+        ("folder.png", r"folder\.png: is a folder; choose a file in it"),
+        ("/proc/picture.png", r"/proc/picture\.png: no file can be written in the folder /proc \("),
+        ("file.png/a.png", r"the folder .*file\.png does not exist"),
+    ],
+)
 def test_unwritable_paths_are_refused_before_and_while_writing(tmp_path: Path, name: str, message: str) -> None:
     (tmp_path / "folder.png").mkdir()
     (tmp_path / "file.png").write_text("")
@@ -203,8 +206,12 @@ def test_a_failing_write_leaves_the_old_picture(tmp_path: Path, extension: str) 
     path = tmp_path / f"a.{extension}"
     path.write_text("the old picture")
     (tmp_path / "elsewhere").mkdir()
-    result = subprocess.run([sys.executable, "-c", FULL_DISK, tmp_path / "elsewhere" / f"warm.{extension}", path],
-                            capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, tmp_path / "elsewhere" / f"warm.{extension}", path],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert result.stdout.startswith(f"{path}: cannot be written (") and "choose another path" in result.stdout
     assert result.stderr == ""
     assert path.read_text() == "the old picture"
@@ -235,13 +242,16 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name, told", [("a.png", True), ("a.hdr", True), ("a.exr", False)])
-def test_values_that_are_no_light_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture, name: str,
-                                              told: bool) -> None:
+def test_values_that_are_no_light_are_counted(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, name: str, told: bool
+) -> None:
     """They are replaced and counted in .png and .hdr files; an .exr keeps them."""
     flawed = np.array([[[math.nan, math.nan, -1], [-math.inf, math.inf, 0.5], [0, -0.0, 3e38]]], np.float32)
     write_image(tmp_path / name, flawed)
-    message = (f"{tmp_path / name}: of the image's values, 2 are NaN and 2 negative, written as 0, and 1 infinite, "
-               "written as the largest value")
+    message = (
+        f"{tmp_path / name}: of the image's values, 2 are NaN and 2 negative, written as 0, and 1 infinite, "
+        "written as the largest value"
+    )
     assert caplog.messages == [message] * told
     write_image(tmp_path / name, np.ones((1, 1, 3), np.float32))
     assert len(caplog.messages) == told

@@ -17,7 +17,7 @@ from clrt.output.error_plots import check_plot, plot_errors, plot_history
 from clrt.output.images import read_image
 
 #: The first two colors of matplotlib's cycle.
-BLUE, ORANGE = (0x1f, 0x77, 0xb4), (0xff, 0x7f, 0x0e)
+BLUE, ORANGE = (0x1F, 0x77, 0xB4), (0xFF, 0x7F, 0x0E)
 TIMES = [1.0, 3.0, 10.0, 30.0, 100.0]
 
 
@@ -27,7 +27,7 @@ def curve_pixels(path: Path, colour: tuple[int, int, int]) -> NDArray[np.int64]:
     wanted = linear_from_srgb(np.array(colour, np.float32) / np.float32(255))
     near = np.abs(np.subtract(pixels, wanted)).max(-1) < 0.02
     height, width = near.shape
-    near[:height // 3, width // 2:] = False
+    near[: height // 3, width // 2 :] = False
     return np.argwhere(near)
 
 
@@ -46,8 +46,9 @@ def test_powers_of_time_are_straight_lines(tmp_path: Path, power: float, bend: b
 def test_history_has_an_estimate_and_true_errors(tmp_path: Path) -> None:
     """The true error, four times the estimated one, lies above it everywhere."""
     history: list[dict[str, Any]] = [{"spp": 1, "seconds": 0.5, "noise": None, "relmse": 4.0}]
-    history += [{"spp": 2, "seconds": seconds, "noise": 0.1 / seconds, "relmse": (0.4 / seconds) ** 2}
-                for seconds in TIMES]
+    history += [
+        {"spp": 2, "seconds": seconds, "noise": 0.1 / seconds, "relmse": (0.4 / seconds) ** 2} for seconds in TIMES
+    ]
     assert plot_history(tmp_path / "h.png", "ball", history) == tmp_path / "h.png"
     estimate, true = (curve_pixels(tmp_path / "h.png", colour) for colour in (BLUE, ORANGE))
     assert true[:, 1].min() < estimate[:, 1].min() - 10, "without an estimate there is still a true error"

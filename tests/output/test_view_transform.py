@@ -40,9 +40,16 @@ def test_known_values() -> None:
     assert shown([0, 0.18, 0.5, 1, 2], "raw") == [0, 46, 128, 255, 255]
 
 
-@pytest.mark.parametrize("view, signal", [
-    ("srgb", 1.055 * 0.18 ** (1 / 2.4) - 0.055), ("raw", 0.18), ("pbr_neutral", 1.055 * 0.14 ** (1 / 2.4) - 0.055),
-    ("agx", 0.5), ("aces", 0.349188)])
+@pytest.mark.parametrize(
+    "view, signal",
+    [
+        ("srgb", 1.055 * 0.18 ** (1 / 2.4) - 0.055),
+        ("raw", 0.18),
+        ("pbr_neutral", 1.055 * 0.14 ** (1 / 2.4) - 0.055),
+        ("agx", 0.5),
+        ("aces", 0.349188),
+    ],
+)
 def test_grey_card(view: str, signal: float) -> None:
     """Values: sRGB of 0.18; sRGB of 0.14, which Khronos's offset of 0.04 leaves; AgX's pivot; OpenColorIO's."""
     card = np.full((1, 1, 3), 0.18, np.float32)
@@ -138,11 +145,25 @@ def test_pbr_neutral_is_khronos_s() -> None:
 def test_agx_is_the_published_table() -> None:
     """Entries of AgX_Default_Contrast.spi1d in github.com/sobotka/AgX, of 4096 from 2^-12.47393 to 2^4.026069, applied
     to colors after the published matrix."""
-    table = {300: 0.0054006, 819: 0.024569, 1365: 0.0810636, 2000: 0.271826, 2400: 0.4600463,
-             2482: 0.5000888, 2600: 0.5577078, 3000: 0.7468467, 3500: 0.9180099, 4000: 0.9925869}
-    inset = np.array([[0.842479062253094, 0.0784335999999992, 0.0792237451477643],
-                      [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
-                      [0.0423756549057051, 0.0784336, 0.879142973793104]])
+    table = {
+        300: 0.0054006,
+        819: 0.024569,
+        1365: 0.0810636,
+        2000: 0.271826,
+        2400: 0.4600463,
+        2482: 0.5000888,
+        2600: 0.5577078,
+        3000: 0.7468467,
+        3500: 0.9180099,
+        4000: 0.9925869,
+    }
+    inset = np.array(
+        [
+            [0.842479062253094, 0.0784335999999992, 0.0792237451477643],
+            [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
+            [0.0423756549057051, 0.0784336, 0.879142973793104],
+        ]
+    )
     entries = np.array(list(table))
     tristimuli = np.exp2(entries / 4095 * (4.026069 + 12.47393) - 12.47393)
     rows = np.stack([tristimuli, tristimuli, tristimuli], axis=1)
@@ -171,8 +192,9 @@ def own_config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name, power in (("Linear Rec.709", 1.0), ("cube root", 1 / 3), ("square root", 1 / 2)):
         space = PyOpenColorIO.ColorSpace(name=name)
         if power != 1:
-            space.setTransform(PyOpenColorIO.ExponentTransform([power, power, power, 1]),
-                               PyOpenColorIO.COLORSPACE_DIR_FROM_REFERENCE)
+            space.setTransform(
+                PyOpenColorIO.ExponentTransform([power, power, power, 1]), PyOpenColorIO.COLORSPACE_DIR_FROM_REFERENCE
+            )
         config.addColorSpace(space)
     for role in ("scene_linear", "default"):
         config.setRole(role, "Linear Rec.709")
@@ -189,8 +211,10 @@ def test_views_of_a_config_of_ones_own(own_config: Path) -> None:
     for view, power in (("ocio", 1 / 2), ("ocio:Plain", 1 / 2), ("ocio:Filmic", 1 / 3), ("ocio:Other/Plain", 1 / 3)):
         expected = [math.floor(255 * value**power + 0.5) for value in (1 / 16, 1 / 4)]
         assert shown([0.125, 0.5], view, exposure=-1) == expected
-    told = ("config.ocio: view 'Flimic' is unknown; Screen has Plain, Filmic, others are named DISPLAY/VIEW for "
-            "Screen, Other; did you mean ocio:Filmic")
+    told = (
+        "config.ocio: view 'Flimic' is unknown; Screen has Plain, Filmic, others are named DISPLAY/VIEW for "
+        "Screen, Other; did you mean ocio:Filmic"
+    )
     with pytest.raises(UsageError, match=told):
         view_called("ocio:Flimic")
 
@@ -198,8 +222,11 @@ def test_views_of_a_config_of_ones_own(own_config: Path) -> None:
 def test_configs_that_are_none(own_config: Path) -> None:
     own_config.with_name("broken.ocio").write_text("[")
     own_config.with_name("other.ocio").write_text(own_config.read_text().replace("Linear Rec.709", "film"))
-    for name, message in (("broken", "is not a usable OpenColor"), ("missing", "is not a usable OpenColor"),
-                          ("other", "has no colour space called lin_rec709")):
+    for name, message in (
+        ("broken", "is not a usable OpenColor"),
+        ("missing", "is not a usable OpenColor"),
+        ("other", "has no colour space called lin_rec709"),
+    ):
         with pytest.raises(UsageError, match=f"{name}.ocio: {message}"):
             ocio_view(str(own_config.with_name(f"{name}.ocio")), "")
 

@@ -28,16 +28,23 @@ PLACES = np.concatenate([np.tile(np.eye(3), (5, 1, 1)), RNG.normal(size=(5, 3, 1
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.toml"))
 
 COPIES: dict[str, Callable[[Any], Any]] = {
-    "pickle": lambda each: pickle.loads(pickle.dumps(each)), "copy": copy.copy, "deepcopy": copy.deepcopy}
+    "pickle": lambda each: pickle.loads(pickle.dumps(each)),
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+}
 #: Query options: each layout, and other state that a copy must keep.
 OPTIONS: dict[str, dict[str, Any]] = {
     **{layout: {"layout": layout} for layout in ("bvh8", "bvh2", "cwbvh", "packs", "list")},
-    "ploc": {"builder": "ploc"}, "spheres": {"spheres": SPHERES}, "pool": {"traversal": "pool"}}
+    "ploc": {"builder": "ploc"},
+    "spheres": {"spheres": SPHERES},
+    "pool": {"traversal": "pool"},
+}
 
 
 def instanced(device: Device, **options: Any) -> clrt.InstancedRayQuery:
-    return clrt.InstancedRayQuery([(VERTICES, FACES), (VERTICES[::-1], FACES[:50])], [0, 1, 0, 1, 1], PLACES,
-                                  device=device.info.index, **options)
+    return clrt.InstancedRayQuery(
+        [(VERTICES, FACES), (VERTICES[::-1], FACES[:50])], [0, 1, 0, 1, 1], PLACES, device=device.info.index, **options
+    )
 
 
 def query(device: Device, **options: Any) -> clrt.RayQuery:

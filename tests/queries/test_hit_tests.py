@@ -55,7 +55,7 @@ def test_hits_are_those_of_float64_away_from_edges(device: Device, triangle: str
 
     Forms that precompute the area never hit triangles without area; from corners alone, rounding may allow a hit.
     """
-    faces = FACES if triangle in FORMS else FACES[:len(GOOD)]
+    faces = FACES if triangle in FORMS else FACES[: len(GOOD)]
     origins, directions = ORIGINS.astype(np.float64), DIRECTIONS.astype(np.float64)
     t, which, margin = hit_triangles(GOOD.astype(np.float64), origins, directions)
     clear = margin > 1e-4
@@ -85,8 +85,11 @@ def test_records_are_what_the_papers_say(layout: str, triangle: str) -> None:
     records, used = tree.buffers[name], tree.buffers[name]["primitive"] >= 0
     assert records.dtype.itemsize == {"packs": 320 + 12 * 8, "leaf_triangles": 64}[name]
     assert tree.bytes - corners.bytes == len(records) * {"packs": 12 * 8, "leaf_triangles": 16}[name]
-    rows = {field: np.moveaxis(records[field], 1, -1)[used].astype(np.float64)
-            for field in records.dtype.names if records[field].ndim > 1 and field not in ("primitive", "pad")}
+    rows = {
+        field: np.moveaxis(records[field], 1, -1)[used].astype(np.float64)
+        for field in records.dtype.names
+        if records[field].ndim > 1 and field not in ("primitive", "pad")
+    }
     expected = GOOD[records["primitive"][used]].astype(np.float64)
     if triangle == "baldwin_weber":
         points = np.concatenate([expected, np.ones((len(expected), 3, 1))], axis=2)
@@ -106,8 +109,10 @@ def test_instances_are_hit_by_every_test_alike(device: Device, layout: str, tria
     rng = np.random.default_rng(7)
     mesh, to_world = rng.integers(0, 3, 40), transforms(rng, "stretched", 40)
     origins, targets = rng.uniform(-6, 6, (2, 3000, 3)).astype(np.float32)
-    one, other = (clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout, **chosen)
-                  for chosen in ({}, {"triangle": triangle}))
+    one, other = (
+        clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout, **chosen)
+        for chosen in ({}, {"triangle": triangle})
+    )
     for moved in (to_world, to_world[::-1]):
         for query in (one, other):
             query.move(moved)
@@ -121,14 +126,17 @@ def test_instances_are_hit_by_every_test_alike(device: Device, layout: str, tria
 @pytest.mark.parametrize("triangle", FORMS)
 def test_moved_vertices_get_new_records(device: Device, triangle: str) -> None:
     moved = (VERTICES * np.array([1, -1, 1]) + 0.25).astype(np.float32)
-    query, new = (clrt.RayQuery(vertices, FACES, device=device.info.index, layout="bvh8", triangle=triangle)
-                  for vertices in (VERTICES, moved))
+    query, new = (
+        clrt.RayQuery(vertices, FACES, device=device.info.index, layout="bvh8", triangle=triangle)
+        for vertices in (VERTICES, moved)
+    )
     query.refit(moved)
     np.testing.assert_array_equal(query.closest_hit(ORIGINS, DIRECTIONS), new.closest_hit(ORIGINS, DIRECTIONS))
 
 
-@pytest.mark.parametrize("layout, traversal", [
-    ("bvh8", "single"), ("cwbvh", None), *others(("bvh8", "pool"), ("bvh2", None))])
+@pytest.mark.parametrize(
+    "layout, traversal", [("bvh8", "single"), ("cwbvh", None), *others(("bvh8", "pool"), ("bvh2", None))]
+)
 def test_plain_boxes_lose_what_robust_ones_find(device: Device, layout: str, traversal: str | None) -> None:
     """Plain boxes miss some vertices seen from inside a closed mesh, where boxes end; face centers give equal hits.
 
@@ -145,16 +153,24 @@ def test_plain_boxes_lose_what_robust_ones_find(device: Device, layout: str, tra
     assert np.all(robust.closest_hit(origins, targets - origins)["primitive"] >= 0)
     assert 0 < np.sum(plain.closest_hit(origins, targets - origins)["primitive"] < 0) < 0.1 * len(targets)
     middles = vertices[faces].mean(axis=1, dtype=np.float32)
-    rays = origins[:len(middles)], middles - origins[:len(middles)]
+    rays = origins[: len(middles)], middles - origins[: len(middles)]
     np.testing.assert_array_equal(plain.closest_hit(*rays), robust.closest_hit(*rays))
 
 
-@pytest.mark.parametrize("kind, choices", {"triangle": "watertight, moller_trumbore, precomputed, baldwin_weber",
-                                           "box": "robust, plain", "sphere": "robust, textbook"}.items())
+@pytest.mark.parametrize(
+    "kind, choices",
+    {
+        "triangle": "watertight, moller_trumbore, precomputed, baldwin_weber",
+        "box": "robust, plain",
+        "sphere": "robust, textbook",
+    }.items(),
+)
 def test_unknown_tests_are_refused(kind: str, choices: str) -> None:
     scene = clrt.Scene(spheres=[clrt.Sphere()])
-    asks: list[Any] = [lambda **chosen: clrt.RayQuery(VERTICES, FACES, **chosen),
-                       lambda **chosen: clrt.Renderer(scene, **chosen)]
+    asks: list[Any] = [
+        lambda **chosen: clrt.RayQuery(VERTICES, FACES, **chosen),
+        lambda **chosen: clrt.Renderer(scene, **chosen),
+    ]
     for ask, wrong in product(asks, ("", "fast")):
         with pytest.raises(clrt.UsageError, match=f"{kind} '{wrong}' is unknown; choose from {choices}"):
             ask(**{kind: wrong})

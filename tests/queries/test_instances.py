@@ -15,8 +15,10 @@ from ..covering import covering
 
 Doubles = NDArray[np.float64]
 RNG = np.random.default_rng(11)
-MESHES = [(RNG.uniform(-1, 1, (3 * n, 3)).astype(np.float32), np.arange(3 * n, dtype=np.int32).reshape(-1, 3))
-          for n in (60, 1, 9)]
+MESHES = [
+    (RNG.uniform(-1, 1, (3 * n, 3)).astype(np.float32), np.arange(3 * n, dtype=np.int32).reshape(-1, 3))
+    for n in (60, 1, 9)
+]
 RAYS = 1500
 LAYOUTS = ["bvh8", "bvh2", "cwbvh"]
 WAYS = (("bvh8", "single"), ("bvh8", "pool"), ("bvh2", None), ("cwbvh", None))
@@ -27,16 +29,21 @@ LEAVES = {"bvh8": "packs", "bvh2": "leaf_triangles", "cwbvh": "leaf_triangles"}
 def transforms(rng: np.random.Generator, kind: str, count: int) -> Doubles:
     """Return (count, 3, 4) transforms: rotated, scaled, mirrored or nearly flattened."""
     turned = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
-    scale = {"turned": np.ones((count, 1, 3)), "stretched": rng.uniform(0.1, 3, (count, 1, 3)),
-             "mirrored": rng.choice([-1.0, 1.0], (count, 1, 3)), "flat": np.tile([1.0, 1.0, 1e-5], (count, 1, 1)),
-             "tiny": np.full((count, 1, 3), 1e-4)}[kind]
+    scale = {
+        "turned": np.ones((count, 1, 3)),
+        "stretched": rng.uniform(0.1, 3, (count, 1, 3)),
+        "mirrored": rng.choice([-1.0, 1.0], (count, 1, 3)),
+        "flat": np.tile([1.0, 1.0, 1e-5], (count, 1, 1)),
+        "tiny": np.full((count, 1, 3), 1e-4),
+    }[kind]
     return np.concatenate([turned * scale, rng.uniform(-4, 4, (count, 3, 1))], axis=2)
 
 
 def baked(mesh: NDArray[Any], to_world: Doubles) -> tuple[Doubles, NDArray[np.intp]]:
     """Return (m, 3, 3) corners in the world, and the (m, 2) instance and primitive of each."""
-    corners = [MESHES[index][0].astype(np.float64) @ matrix[:, :3].T + matrix[:, 3]
-               for index, matrix in zip(mesh, to_world)]
+    corners = [
+        MESHES[index][0].astype(np.float64) @ matrix[:, :3].T + matrix[:, 3] for index, matrix in zip(mesh, to_world)
+    ]
     names = [(i, primitive) for i, index in enumerate(mesh) for primitive in range(len(MESHES[index][1]))]
     return np.concatenate(corners).reshape(-1, 3, 3), np.array(names)
 
@@ -76,13 +83,13 @@ def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, way: 
     nearest, first = t.min(axis=1), t.argmin(axis=1)
     second = np.partition(t, 1, axis=1)[:, 1]
     normal = np.cross(corners[first, 1] - corners[first, 0], corners[first, 2] - corners[first, 0])
-    grazing = np.abs((normal * directions).sum(1)) < 0.05 * np.linalg.norm(normal, axis=1) * np.linalg.norm(directions,
-                                                                                                            axis=1)
+    grazing = np.abs((normal * directions).sum(1)) < 0.05 * np.linalg.norm(normal, axis=1) * np.linalg.norm(
+        directions, axis=1
+    )
     # Relative to a tiny, distant mesh, rays are only accurate to a hundredth of its size.
     clear = (np.abs(depth) > (0.03 if kind == "tiny" else 1e-3)).all(axis=1) & (second > 1.001 * nearest) & ~grazing
     assert clear.sum() > 50
-    query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout,
-                                   traversal=traversal)
+    query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout, traversal=traversal)
     hits = query.closest_hit(origins, directions)
     hit = np.isfinite(nearest)
     expected = np.where(hit[:, None], names[first], -1)
@@ -92,8 +99,9 @@ def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, way: 
 
 
 @pytest.mark.parametrize("lanes, ways", [(1, WAYS[::3]), (8, WAYS)])
-def test_layouts_agree_to_the_last_bit(device: Device, lanes: int, ways: tuple[tuple[str, str | None], ...],
-                                       monkeypatch: pytest.MonkeyPatch) -> None:
+def test_layouts_agree_to_the_last_bit(
+    device: Device, lanes: int, ways: tuple[tuple[str, str | None], ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Includes many overlapping instances, so that a ray returns to the upper level many times."""
     monkeypatch.setattr(Device, "lanes", lanes)
     rng = np.random.default_rng(7)
@@ -102,10 +110,16 @@ def test_layouts_agree_to_the_last_bit(device: Device, lanes: int, ways: tuple[t
     origins, targets = rng.uniform(-8, 8, (2, 4000, 3)).astype(np.float32)
     answers = []
     for layout, traversal in ways:
-        query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout,
-                                       traversal=traversal)
-        answers.append((query.closest_hit(origins, targets - origins), query.any_hit(origins, targets - origins, 0.7),
-                        *query.all_hits(origins[:200], (targets - origins)[:200])))
+        query = clrt.InstancedRayQuery(
+            MESHES, mesh, to_world, device=device.info.index, layout=layout, traversal=traversal
+        )
+        answers.append(
+            (
+                query.closest_hit(origins, targets - origins),
+                query.any_hit(origins, targets - origins, 0.7),
+                *query.all_hits(origins[:200], (targets - origins)[:200]),
+            )
+        )
     assert (answers[0][0]["primitive"] >= 0).mean() > 0.5 and 0.3 < answers[0][1].mean() < 0.9
     for others in answers[1:]:
         for answer, other in zip(answers[0], others):
@@ -121,9 +135,13 @@ def test_sizes_do_not_matter(device: Device, layout: str, mesh_size: float, worl
     mesh, to_world = rng.integers(0, 3, 20), transforms(rng, "stretched", 20)
     origins, targets = rng.uniform(-8, 8, (2, 1000, 3)).astype(np.float32)
     plain = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout)
-    scaled = clrt.InstancedRayQuery([(vertices * np.float32(mesh_size), faces) for vertices, faces in MESHES], mesh,
-                                    world_size * to_world * [*[1 / mesh_size] * 3, 1], device=device.info.index,
-                                    layout=layout)
+    scaled = clrt.InstancedRayQuery(
+        [(vertices * np.float32(mesh_size), faces) for vertices, faces in MESHES],
+        mesh,
+        world_size * to_world * [*[1 / mesh_size] * 3, 1],
+        device=device.info.index,
+        layout=layout,
+    )
     hits = plain.closest_hit(origins, targets - origins)
     assert (hits["primitive"] >= 0).mean() > 0.2
     origins, targets = origins * np.float32(world_size), targets * np.float32(world_size)
@@ -148,10 +166,13 @@ def test_ten_thousand_instances_cost_the_memory_of_one(device: Device, layout: s
     cells = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
     to_world = np.tile(np.eye(3, 4), (side * side, 1, 1))
     to_world[:, :2, 3] = 3 * cells
-    blanket = (np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
-               np.array([[0, 1, 2], [0, 2, 3]], np.int32))
-    query = clrt.InstancedRayQuery([blanket], np.zeros(side * side, int), to_world, device=device.info.index,
-                                   layout=layout)
+    blanket = (
+        np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
+        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+    )
+    query = clrt.InstancedRayQuery(
+        [blanket], np.zeros(side * side, int), to_world, device=device.info.index, layout=layout
+    )
     origins = np.concatenate([3 * cells + [0.3, 0.2], np.ones((side * side, 1))], axis=1)
     hits = query.closest_hit(origins, [0, 0, -1])
     np.testing.assert_array_equal(hits["instance"], np.arange(side * side))
@@ -164,20 +185,28 @@ def test_ten_thousand_instances_cost_the_memory_of_one(device: Device, layout: s
 def test_nothing_to_hit(device: Device, layout: str) -> None:
     empty = (np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
     for mesh, meshes in (([], MESHES), ([], []), ([0, 0], [empty]), ([0, 0], [empty, *MESHES])):
-        query = clrt.InstancedRayQuery(meshes, np.array(mesh, int), np.tile(np.eye(3, 4), (len(mesh), 1, 1)),
-                                       device=device.info.index, layout=layout)
+        query = clrt.InstancedRayQuery(
+            meshes,
+            np.array(mesh, int),
+            np.tile(np.eye(3, 4), (len(mesh), 1, 1)),
+            device=device.info.index,
+            layout=layout,
+        )
         hits = query.closest_hit([0, 0, 0], [[0, 0, 1], [1, 1, 1]])
         assert hits["instance"].tolist() == hits["primitive"].tolist() == [-1, -1]
 
 
-@pytest.mark.parametrize("mesh, matrix, message", [
-    ([3], np.eye(3, 4), r"mesh\[0\] = 3: there are 3 meshes"),
-    ([0], np.eye(4), r"transforms \(1, 4, 4\) must .*transforms\[:, :3\]"),
-    ([0], 1j * np.eye(3, 4), "transforms has dtype complex128"),
-    ([0], np.diag([1.0, 1.0, 0.0]) @ np.eye(3, 4), r"transforms\[0\].*flattens the mesh"),
-    ([0], np.full((3, 4), np.nan), r"transforms\[0\].*not finite"),
-    ([0.5], np.eye(3, 4), "integers"),
-])
+@pytest.mark.parametrize(
+    "mesh, matrix, message",
+    [
+        ([3], np.eye(3, 4), r"mesh\[0\] = 3: there are 3 meshes"),
+        ([0], np.eye(4), r"transforms \(1, 4, 4\) must .*transforms\[:, :3\]"),
+        ([0], 1j * np.eye(3, 4), "transforms has dtype complex128"),
+        ([0], np.diag([1.0, 1.0, 0.0]) @ np.eye(3, 4), r"transforms\[0\].*flattens the mesh"),
+        ([0], np.full((3, 4), np.nan), r"transforms\[0\].*not finite"),
+        ([0.5], np.eye(3, 4), "integers"),
+    ],
+)
 def test_mistakes_are_named(device: Device, mesh: list[Any], matrix: Doubles, message: str) -> None:
     with pytest.raises(clrt.SceneError, match=message):
         clrt.InstancedRayQuery(MESHES, mesh, matrix[None], device=device.info.index)
@@ -193,10 +222,14 @@ def test_every_fault_of_transforms_is_named(device: Device) -> None:
     assert second.startswith("transforms[2]") and "flattens" in second and "2 more" in second
 
 
-@pytest.mark.parametrize("meshes, message", [
-    (MESHES[0], r"meshes\[0\] is not a pair \(vertices, faces\); write"), (None, "meshes is a NoneType"),
-    ([MESHES[0], (np.zeros((3, 3)), [[0, 1, 3]])], r"^meshes\[1\]: faces\[0\]"),
-])
+@pytest.mark.parametrize(
+    "meshes, message",
+    [
+        (MESHES[0], r"meshes\[0\] is not a pair \(vertices, faces\); write"),
+        (None, "meshes is a NoneType"),
+        ([MESHES[0], (np.zeros((3, 3)), [[0, 1, 3]])], r"^meshes\[1\]: faces\[0\]"),
+    ],
+)
 def test_what_are_no_meshes_is_refused(device: Device, meshes: Any, message: str) -> None:
     with pytest.raises(clrt.SceneError, match=message):
         clrt.InstancedRayQuery(meshes, [0], np.eye(3, 4)[None], device=device.info.index)

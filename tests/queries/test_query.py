@@ -24,8 +24,9 @@ ORIGINS = RNG.uniform(-2, 2, (3000, 3)).astype(np.float32)
 DIRECTIONS = (RNG.normal(size=(3000, 3)) * RNG.uniform(0.1, 10, (3000, 1))).astype(np.float32)
 
 
-@pytest.fixture(params=["bvh8-single", "bvh8-packet", "bvh8-pool", "bvh2-single", "cwbvh-single", "packs-single",
-                        "list-single"])
+@pytest.fixture(
+    params=["bvh8-single", "bvh8-packet", "bvh8-pool", "bvh2-single", "cwbvh-single", "packs-single", "list-single"]
+)
 def soup(request: pytest.FixtureRequest, device: Device) -> clrt.RayQuery:
     """Return a query of random triangles for each layout and traversal."""
     layout, traversal = request.param.split("-")
@@ -39,8 +40,10 @@ def brute_force(origins: Doubles, directions: Doubles) -> tuple[Doubles, Doubles
     with np.errstate(divide="ignore", invalid="ignore"):
         t = ((p0 * normal).sum(1) - origins @ normal.T) / (directions @ normal.T)
         point = origins[:, None] + t[..., None] * directions[:, None]
-        edges = [np.einsum("nmk,mk->nm", np.cross(b - a, point - a), normal) / (normal**2).sum(1)
-                 for a, b in ((p0, p1), (p1, p2), (p2, p0))]
+        edges = [
+            np.einsum("nmk,mk->nm", np.cross(b - a, point - a), normal) / (normal**2).sum(1)
+            for a, b in ((p0, p1), (p1, p2), (p2, p0))
+        ]
         depth = np.minimum.reduce(edges)
         return np.where((depth >= 0) & (t > 0), t, np.inf), np.where(t > 0, depth, -np.inf)
 
@@ -93,8 +96,10 @@ def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
     parallel = np.tile([0.1, 0.2, -1.0], (len(x), 1))
     origins = np.concatenate([np.tile([0.1, 0.2, 3.0], (len(x), 1)), np.stack([x, y, np.full(len(x), 2.0)], axis=1)])
     rays = origins, np.concatenate([fan, parallel]), RNG.uniform(1, 4, len(origins))
-    queries = [clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout="bvh8", traversal=traversal)
-               for traversal in (*base.TRAVERSALS, None)]
+    queries = [
+        clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout="bvh8", traversal=traversal)
+        for traversal in (*base.TRAVERSALS, None)
+    ]
     first, *others = [each.closest_hit(*rays) for each in queries]
     assert (first["primitive"] >= 0).mean() > 0.3
     for hits in others:
@@ -109,8 +114,12 @@ def test_copies_a_hair_away_are_told_apart(device: Device, layout: str) -> None:
     rng = np.random.default_rng(6)
     order = rng.permutation(np.tile(np.arange(64), 9))
     corners = rng.uniform(-1, 1, (64, 3, 3)).astype(np.float32)
-    query = clrt.RayQuery(corners.reshape(-1, 3), np.arange(192, dtype=np.int32).reshape(-1, 3)[order],
-                          device=device.info.index, layout=layout)
+    query = clrt.RayQuery(
+        corners.reshape(-1, 3),
+        np.arange(192, dtype=np.int32).reshape(-1, 3)[order],
+        device=device.info.index,
+        layout=layout,
+    )
     which = rng.integers(64, size=20_000)
     directions = rng.normal(size=(20_000, 3)).astype(np.float32)
     distance = 10.0 ** rng.uniform(-7, -3, (20_000, 1))
@@ -152,41 +161,48 @@ def test_a_mesh_without_faces_is_empty(device: Device) -> None:
     assert (empty.closest_hit(ORIGINS, DIRECTIONS)["primitive"] == -1).all()
 
 
-@pytest.mark.parametrize(("vertices", "faces", "words"), [
-    (np.zeros((3, 2)), [[0, 1, 2]], "(3, 2)"),
-    (np.zeros((3, 3)), [[0, 1, 3]], "faces[0]"),
-    (np.zeros((3, 3)), [[0, -1, 2]], "faces[0]"),
-    (np.zeros((3, 3)), [[0.0, 1.0, 2.0]], "float64"),
-    (np.zeros((4, 3)), [[1, 2, 3], [2, 3, 4]], "faces[1] = [2, 3, 4]: the mesh has 4 vertices, counted from 0"),
-    ([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]], "vertices[2]"),
-    ([[0, 0, 0], [1e300, 0, 0], [0, 1, 0]], [[0, 1, 2]], "vertices[1] = [1e+300, 0.0, 0.0]"),
-    (np.zeros((3, 3), complex), [[0, 1, 2]], "vertices has dtype complex128"),
-    (np.zeros((3, 3)), [[0j, 1, 2]], "faces has dtype complex128"),
-    ([[0, 0, 0], [1, 0]], [[0, 1, 2]], "vertices is not an array"),
-    (np.zeros((3, 3)), [[0, 1, 2], [0]], "faces is not an array"),
-    (np.zeros((3, 3)), "faces", "faces has dtype"),
-])
+@pytest.mark.parametrize(
+    ("vertices", "faces", "words"),
+    [
+        (np.zeros((3, 2)), [[0, 1, 2]], "(3, 2)"),
+        (np.zeros((3, 3)), [[0, 1, 3]], "faces[0]"),
+        (np.zeros((3, 3)), [[0, -1, 2]], "faces[0]"),
+        (np.zeros((3, 3)), [[0.0, 1.0, 2.0]], "float64"),
+        (np.zeros((4, 3)), [[1, 2, 3], [2, 3, 4]], "faces[1] = [2, 3, 4]: the mesh has 4 vertices, counted from 0"),
+        ([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]], "vertices[2]"),
+        ([[0, 0, 0], [1e300, 0, 0], [0, 1, 0]], [[0, 1, 2]], "vertices[1] = [1e+300, 0.0, 0.0]"),
+        (np.zeros((3, 3), complex), [[0, 1, 2]], "vertices has dtype complex128"),
+        (np.zeros((3, 3)), [[0j, 1, 2]], "faces has dtype complex128"),
+        ([[0, 0, 0], [1, 0]], [[0, 1, 2]], "vertices is not an array"),
+        (np.zeros((3, 3)), [[0, 1, 2], [0]], "faces is not an array"),
+        (np.zeros((3, 3)), "faces", "faces has dtype"),
+    ],
+)
 def test_what_is_no_mesh_is_refused(vertices: Any, faces: Any, words: str) -> None:
     with pytest.raises(clrt.SceneError) as caught:
         clrt.RayQuery(vertices, faces)
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize(("origins", "directions", "t_max", "words"), [
-    (np.zeros((2, 3)), np.ones((3, 3)), 1, r"directions \(3, 3\): there are 2 origins"),
-    (np.zeros((2, 3)), np.ones((2, 3)), np.ones(3), r"t_max \(3,\): there are 2 origins"),
-    (np.zeros(3), np.ones((2, 3)), np.ones(3), r"t_max \(3,\): there are 2 directions"),
-    (np.zeros(2), np.ones(3), 1, r"origins \(2,\) must"),
-    (np.zeros((3, 9)), np.ones((3, 9)), 1, r"origins \(3, 9\) must"),
-    (np.zeros(3), np.ones((2, 2, 3)), 1, r"directions \(2, 2, 3\) must"),
-    (np.zeros(3), np.ones(3), np.ones((2, 2)), r"t_max \(2, 2\) must"),
-    (np.zeros(3), np.ones(3), None, "t_max has dtype object"),
-    (np.zeros(3), np.ones(3), "far", "t_max has dtype"),
-    (np.zeros(3, complex), np.ones(3), 1, "origins has dtype complex128"),
-    ([[0, 0, 0], [0]], np.ones(3), 1, "origins is not an array"),
-])
-def test_rays_that_do_not_fit_are_refused(device: Device, origins: Any, directions: Any, t_max: Any,
-                                          words: str) -> None:
+@pytest.mark.parametrize(
+    ("origins", "directions", "t_max", "words"),
+    [
+        (np.zeros((2, 3)), np.ones((3, 3)), 1, r"directions \(3, 3\): there are 2 origins"),
+        (np.zeros((2, 3)), np.ones((2, 3)), np.ones(3), r"t_max \(3,\): there are 2 origins"),
+        (np.zeros(3), np.ones((2, 3)), np.ones(3), r"t_max \(3,\): there are 2 directions"),
+        (np.zeros(2), np.ones(3), 1, r"origins \(2,\) must"),
+        (np.zeros((3, 9)), np.ones((3, 9)), 1, r"origins \(3, 9\) must"),
+        (np.zeros(3), np.ones((2, 2, 3)), 1, r"directions \(2, 2, 3\) must"),
+        (np.zeros(3), np.ones(3), np.ones((2, 2)), r"t_max \(2, 2\) must"),
+        (np.zeros(3), np.ones(3), None, "t_max has dtype object"),
+        (np.zeros(3), np.ones(3), "far", "t_max has dtype"),
+        (np.zeros(3, complex), np.ones(3), 1, "origins has dtype complex128"),
+        ([[0, 0, 0], [0]], np.ones(3), 1, "origins is not an array"),
+    ],
+)
+def test_rays_that_do_not_fit_are_refused(
+    device: Device, origins: Any, directions: Any, t_max: Any, words: str
+) -> None:
     query = clrt.RayQuery(VERTICES, FACES, device=device.info.index)
     for ask in (query.closest_hit, query.any_hit, query.all_hits):
         with pytest.raises(clrt.UsageError, match=words):
@@ -199,11 +215,18 @@ def test_numbers_of_hits_are_whole(device: Device, max_hits: Any) -> None:
         clrt.RayQuery(VERTICES, FACES, device=device.info.index).all_hits(ORIGINS, DIRECTIONS, max_hits=max_hits)
 
 
-@pytest.mark.parametrize(("choice", "words"), [
-    ({"layout": "bvh9"}, "bvh2, bvh8, cwbvh"), ({"builder": "lbvh"}, "ploc, reinsertion, sah, midpoint"),
-    ({"traversal": "pol"}, "single, packet, pool"), ({"traversal": "pool", "layout": "bvh2"}, "bvh8, not bvh2"),
-    ({"triangle": "watertite"}, "watertight, "), ({"box": "loose"}, "robust, plain"), ({"sphere": "flat"}, "textbook"),
-])
+@pytest.mark.parametrize(
+    ("choice", "words"),
+    [
+        ({"layout": "bvh9"}, "bvh2, bvh8, cwbvh"),
+        ({"builder": "lbvh"}, "ploc, reinsertion, sah, midpoint"),
+        ({"traversal": "pol"}, "single, packet, pool"),
+        ({"traversal": "pool", "layout": "bvh2"}, "bvh8, not bvh2"),
+        ({"triangle": "watertite"}, "watertight, "),
+        ({"box": "loose"}, "robust, plain"),
+        ({"sphere": "flat"}, "textbook"),
+    ],
+)
 def test_choices_that_are_none_are_refused(device: Device, choice: dict[str, Any], words: str) -> None:
     with pytest.raises(clrt.UsageError, match=words):
         clrt.RayQuery(VERTICES, FACES, device=device.info.index, **choice)

@@ -25,8 +25,9 @@ VERTICES = np.concatenate([BALL + np.array([1.2 * i, 0, 0], np.float32) for i in
 RNG = np.random.default_rng(17)
 SHUFFLED = RNG.permutation(VERTICES)
 ORIGINS = RNG.uniform(-3, 8, (3000, 3)).astype(np.float32)
-DIRECTIONS = (VERTICES[RNG.integers(0, len(VERTICES), 3000)] - ORIGINS
-              + RNG.normal(0, 0.3, (3000, 3))).astype(np.float32)
+DIRECTIONS = (VERTICES[RNG.integers(0, len(VERTICES), 3000)] - ORIGINS + RNG.normal(0, 0.3, (3000, 3))).astype(
+    np.float32
+)
 CORNERS = ("p0", "p1", "p2")
 TREES = [("bvh8", "ploc"), ("bvh8", "sah"), ("bvh2", "ploc"), ("bvh2", "sah"), ("bvh2", "midpoint")]
 
@@ -108,9 +109,9 @@ def test_binary_boxes_are_those_of_what_is_below(device: Device, builder: str) -
     found = np.stack([nodes["aabb_min"], nodes["aabb_max"]], axis=1)
     for row in np.delete(np.arange(len(nodes)), 1):
         first, count = int(nodes["left_first"][row]), int(nodes["count"][row])
-        below = found[first:first + 2]
+        below = found[first : first + 2]
         union = np.stack([below[:, 0].min(axis=0), below[:, 1].max(axis=0)])
-        np.testing.assert_array_equal(found[row], box(corners[first:first + count]) if count else union)
+        np.testing.assert_array_equal(found[row], box(corners[first : first + count]) if count else union)
 
 
 @pytest.mark.parametrize("layout", ["bvh8", "bvh2"])
@@ -120,7 +121,7 @@ def test_any_size_after_any_other(device: Device, layout: str) -> None:
     plain = query(device, VERTICES, (layout, "sah"))
     expected = plain.closest_hit(ORIGINS, DIRECTIONS)
     for exponent in (10, 60, -70, -69, 0):
-        size = 2.0 ** exponent
+        size = 2.0**exponent
         refitted.refit(VERTICES * np.float32(size))
         hits = refitted.closest_hit(ORIGINS * np.float32(size), DIRECTIONS * np.float32(size))
         np.testing.assert_array_equal(hits, expected)
@@ -145,11 +146,14 @@ def test_tiny_meshes(device: Device, layout: str) -> None:
         assert small.closest_hit([0, 0, 1], [0, 0, -1])["primitive"].tolist() == [hit]
 
 
-@pytest.mark.parametrize("vertices, message", [
-    (VERTICES[:-1], rf"vertices \({len(VERTICES) - 1}, 3\): the mesh has {len(VERTICES)}"),
-    (VERTICES[:, :2], r"must have the shape \(n, 3\)"),
-    (np.where(np.arange(len(VERTICES))[:, None] == 7, np.nan, VERTICES), r"vertices\[7\].*not finite"),
-])
+@pytest.mark.parametrize(
+    "vertices, message",
+    [
+        (VERTICES[:-1], rf"vertices \({len(VERTICES) - 1}, 3\): the mesh has {len(VERTICES)}"),
+        (VERTICES[:, :2], r"must have the shape \(n, 3\)"),
+        (np.where(np.arange(len(VERTICES))[:, None] == 7, np.nan, VERTICES), r"vertices\[7\].*not finite"),
+    ],
+)
 def test_other_meshes_are_refused(device: Device, vertices: Any, message: str) -> None:
     refitted = query(device, VERTICES, ("bvh8", "sah"))
     with pytest.raises(clrt.SceneError, match=message):

@@ -25,9 +25,16 @@ def reference(mesh: Any) -> Any:
     return trimesh.ray.ray_triangle.RayMeshIntersector(mesh)
 
 
-@pytest.mark.parametrize("mesh", [trimesh.primitives.Sphere().to_mesh(), trimesh.creation.icosphere(),
-                                  trimesh.creation.box(), trimesh.creation.cylinder(1, 2)],
-                         ids=["sphere", "icosphere", "box", "cylinder"])
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        trimesh.primitives.Sphere().to_mesh(),
+        trimesh.creation.icosphere(),
+        trimesh.creation.box(),
+        trimesh.creation.cylinder(1, 2),
+    ],
+    ids=["sphere", "icosphere", "box", "cylinder"],
+)
 def test_a_corner_is_one_location(device: Device, mesh: Any) -> None:
     """trimesh's documented example: two rays, one of which enters and leaves at vertices of up to 32 triangles."""
     mesh.ray = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
@@ -62,7 +69,8 @@ def test_locations_lie_on_ray_and_plane(device: Device) -> None:
     mesh = trimesh.creation.icosphere(subdivisions=4)
     origins, directions = rays(5000)
     locations, index_ray, index_tri = clrt.trimesh.RayMeshIntersector(
-        mesh, device=device.info.index).intersects_location(origins, directions)
+        mesh, device=device.info.index
+    ).intersects_location(origins, directions)
     unit = directions[index_ray] / np.linalg.norm(directions[index_ray], axis=1, keepdims=True)
     assert len(locations) > 1000
     assert np.abs(np.cross(locations - origins[index_ray], unit)).max() < 2e-15
@@ -75,8 +83,9 @@ def test_rays_along_a_plane_are_located_on_the_triangle(device: Device) -> None:
     mesh = trimesh.creation.icosphere()
     corners = mesh.triangles[RNG.integers(0, len(mesh.faces), 5000)]
     one, other = (np.einsum("nk,nkj->nj", weights, corners) for weights in RNG.dirichlet([1, 1, 1], (2, 5000)))
-    locations, _, index_tri = clrt.trimesh.RayMeshIntersector(
-        mesh, device=device.info.index).intersects_location(one - 9 * (other - one), other - one)
+    locations, _, index_tri = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index).intersects_location(
+        one - 9 * (other - one), other - one
+    )
     assert len(locations) > 1000
     hit = mesh.triangles[index_tri]
     beyond = np.maximum(hit.min(axis=1) - locations, locations - hit.max(axis=1)).max(axis=1)
@@ -127,8 +136,9 @@ def test_a_pickled_mesh_answers(device: Device) -> None:
 
 
 @pytest.mark.parametrize("shape", [(3, 300), (300, 2), (300,), (2, 2, 3)])
-@pytest.mark.parametrize("method", ["intersects_id", "intersects_location", "intersects_first", "intersects_any",
-                                    "contains_points"])
+@pytest.mark.parametrize(
+    "method", ["intersects_id", "intersects_location", "intersects_first", "intersects_any", "contains_points"]
+)
 def test_arrays_of_other_shapes_are_refused(device: Device, method: str, shape: tuple[int, ...]) -> None:
     ray = clrt.trimesh.RayMeshIntersector(trimesh.creation.box(), device=device.info.index)
     with pytest.raises(clrt.UsageError, match="must have"):
@@ -159,7 +169,8 @@ def test_a_doubled_surface_contains_what_it_did(device: Device) -> None:
     points = RNG.uniform(-1.2, 1.2, (500, 3))
     expected = clrt.trimesh.RayMeshIntersector(ball, device=device.info.index).contains_points(points)
     np.testing.assert_array_equal(
-        clrt.trimesh.RayMeshIntersector(double, device=device.info.index).contains_points(points), expected)
+        clrt.trimesh.RayMeshIntersector(double, device=device.info.index).contains_points(points), expected
+    )
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e7])
@@ -178,8 +189,10 @@ def test_edges_and_corners_are_one_place(device: Device, scale: float) -> None:
         locations, index_ray, index_tri = ray.intersects_location(origins, directions)
         np.testing.assert_array_equal(np.bincount(index_ray, minlength=len(met)), 2)
         np.testing.assert_allclose(locations[::2], met, atol=2e-6 * mesh.scale, rtol=0)
-        assert [each.tolist() for each in ray.intersects_id(origins, directions)] == [index_tri.tolist(),
-                                                                                      index_ray.tolist()]
+        assert [each.tolist() for each in ray.intersects_id(origins, directions)] == [
+            index_tri.tolist(),
+            index_ray.tolist(),
+        ]
 
 
 @pytest.mark.parametrize("middle", [0.0, 3e5])

@@ -1,6 +1,6 @@
 """Makes trimesh's own tests use clrt in place of both of its engines. In the folder tests of its source:
 
-    PYTHONPATH=CLRT/tests python -m pytest -p trimesh_engine test_ray.py test_ray_upstream.py
+PYTHONPATH=CLRT/tests python -m pytest -p trimesh_engine test_ray.py test_ray_upstream.py
 """
 
 from __future__ import annotations

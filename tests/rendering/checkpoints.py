@@ -26,7 +26,8 @@ def run(running: Renderer, **stops: float) -> State:
 
 def same(a: Renderer, b: Renderer) -> bool:
     """Return whether film, sample counts, estimate and the history at powers of two are equal bit for bit."""
-    histories = [{entry["spp"]: entry["noise"] for entry in r.history if entry["spp"] & (entry["spp"] - 1) == 0}
-                 for r in (a, b)]
+    histories = [
+        {entry["spp"]: entry["noise"] for entry in r.history if entry["spp"] & (entry["spp"] - 1) == 0} for r in (a, b)
+    ]
     films = [(r.session.film().pixels, r.session.tile_samples, *r._progress.convergence.noise.arrays()) for r in (a, b)]
     return histories[0] == histories[1] and all(x.tobytes() == y.tobytes() for x, y in zip(*films))

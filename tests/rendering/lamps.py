@@ -20,8 +20,8 @@ def directions(rng: np.random.Generator, count: int) -> Doubles:
 
 
 def lamps(count: int, seed: int = 0, low: float = -1.0) -> Scene:
-    """Return triangles, spheres and point lights, a third each, with powers over four decades, in [-1, 1]³ above `low`.
-    """
+    """Return triangles, spheres and point lights, a third each, with powers over four decades, in [-1, 1]³ above
+    `low`."""
     rng = np.random.default_rng(seed)
     places = rng.uniform((-1.0, low, -1.0), 1.0, (count, 3))
     powers = 10.0 ** rng.uniform(-2, 2, count)
@@ -41,7 +41,7 @@ def lamps(count: int, seed: int = 0, low: float = -1.0) -> Scene:
 def with_infinite(scene: Scene) -> Scene:
     """Add two distant lights and an environment map to the scene."""
     suns: list[Light] = [DirectionalLight(direction=(x, -1.0, 0.0), irradiance=(0.1, 0.1, 0.1)) for x in (0.0, 2.0)]
-    sky = np.random.default_rng(5).random((8, 16, 1))**8 * np.ones(3)
+    sky = np.random.default_rng(5).random((8, 16, 1)) ** 8 * np.ones(3)
     return replace(scene, lights=[*scene.lights, *suns], environment=Environment(image=sky.astype(np.float32)))
 
 

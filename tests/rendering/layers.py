@@ -25,7 +25,7 @@ def under_coat(strength: float, roughness: float) -> Left:
 
 def under_fibres(strength: float, roughness: float) -> Left:
     """Return 1 − strength·E, with E the bounded sheen albedo."""
-    left = 1 - strength * sheen.bounded_albedo(ROOTS**2, max(roughness, 0.1)**-2)
+    left = 1 - strength * sheen.bounded_albedo(ROOTS**2, max(roughness, 0.1) ** -2)
     return lambda cosines: np.interp(np.sqrt(cosines), ROOTS, left)
 
 
@@ -83,10 +83,12 @@ class Below:
         return np.column_stack([np.interp(np.sqrt(cosines), self.steps, each) for each in self.taken_at.T])
 
     def value(self, gloss: Doubles, cos_o: Doubles, cos_i: Doubles, left_o: Doubles, left_i: Doubles) -> Doubles:
-        """Return f·cos wi (n, 3), given the gloss without layers (n, 3) and the cosines and T of wo and wi, (n,) each.
-        """
-        each = [left[:, None] * self.r(cosines) + self.taken(cosines)
-                for left, cosines in ((left_o, cos_o), (left_i, cos_i))]
+        """Return f·cos wi (n, 3), given the gloss without layers (n, 3) and the cosines and T of wo and wi, (n,)
+        each."""
+        each = [
+            left[:, None] * self.r(cosines) + self.taken(cosines)
+            for left, cosines in ((left_o, cos_o), (left_i, cos_i))
+        ]
         diffuse = each[0] * each[1] * cos_i[:, None] / (np.pi * self.mean)
         return np.asarray(np.minimum(left_o, left_i)[:, None] * gloss + diffuse)
 
@@ -105,10 +107,10 @@ def taken_from_gloss(left: Left, cosine: float, alpha: float, f0: float) -> floa
     lit = (along > 0) & (cos_i > 1e-6)
     cos_i = np.where(lit, cos_i, 1)
     g = shadowing(np.array(cosine), cos_i, alpha, "height_correlated")
-    fresnel = f0 + (1 - f0) * np.maximum(1 - along * cos_h, 0)**5
+    fresnel = f0 + (1 - f0) * np.maximum(1 - along * cos_h, 0) ** 5
     # D·cos θ dωh = 2·sin psi·cos psi dpsi dphi/(2·pi), and f·cos wi dwi = F·G·D·(wo·h)/cos wo dωh.
     f = np.where(lit, fresnel * g * along / cosine * 2 * np.sin(psi) * np.cos(psi), 0)
-    nodes = np.linspace(0, 1, 4000)**2
+    nodes = np.linspace(0, 1, 4000) ** 2
     at = np.interp(cos_i, nodes, left(np.maximum(nodes, 1e-7)))
     taken = np.maximum(float(left(np.array([cosine]))[0]) - at, 0)
     return float(weight @ (f * taken) @ weight * np.pi / 8)

@@ -41,12 +41,12 @@ def film(device: Device, scene: Scene, spp: int | None = None, **chosen: Any) ->
 
 
 def pixel_p_values(film: Film, expected: Doubles) -> Doubles:
-    """Return the p-values (h, w, 3) of the pixel means against expected (h, w, 3), allowing a dozen float32 roundings.
-    """
+    """Return the p-values (h, w, 3) of the pixel means against expected (h, w, 3), allowing a dozen float32
+    roundings."""
     count = film.pixels["count"].astype(np.float64)[..., None]
     squares = (film.pixels["square"].astype(np.float64) + film.pixels["square_error"]) / count
     variance = np.maximum(squares - film.mean**2, 0) * count / (count - 1)
-    return mean_test(film.mean, variance + count * (1e-6 * expected)**2, count, expected)
+    return mean_test(film.mean, variance + count * (1e-6 * expected) ** 2, count, expected)
 
 
 def view_rays(camera: Camera, size: tuple[int, int], x: Doubles, y: Doubles) -> Doubles:
@@ -96,7 +96,12 @@ def box(half: float, material: Material) -> Mesh:
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([side for a, b, c, d in sides for side in ((a, b, c), (a, c, d))], np.int32)
     triangles = corners[faces].astype(np.float64)
-    outside = np.sum(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-                     * triangles.mean(axis=1), axis=1) > 0
+    outside = (
+        np.sum(
+            np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]) * triangles.mean(axis=1),
+            axis=1,
+        )
+        > 0
+    )
     faces[outside] = faces[outside][:, ::-1]
     return Mesh(corners, faces, material)

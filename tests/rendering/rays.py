@@ -31,7 +31,7 @@ def icosphere(subdivisions: int) -> tuple[NDArray[np.float32], NDArray[np.int32]
 
 def grid(side: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Return 2·side² triangles that fill the square [0, side]² of the plane y = 0, with integer coordinates."""
-    z, x = np.divmod(np.arange((side + 1)**2), side + 1)
+    z, x = np.divmod(np.arange((side + 1) ** 2), side + 1)
     corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()[:, None]
     faces = np.concatenate([corner + [0, side + 1, side + 2], corner + [0, side + 2, 1]])
     return np.column_stack([x, 0 * x, z]).astype(np.float32), faces.astype(np.int32)
@@ -65,7 +65,7 @@ def hit_spheres(spheres: Doubles, origin: Doubles, direction: Doubles) -> tuple[
     f = origin[:, None] - spheres[:, :3]
     a, b = np.sum(direction**2, axis=1)[:, None], np.sum(f * direction[:, None], axis=2)
     beside = f - (b / a)[..., None] * direction[:, None]
-    discriminant = 1 - np.sum(beside**2, axis=2) / spheres[:, 3]**2
+    discriminant = 1 - np.sum(beside**2, axis=2) / spheres[:, 3] ** 2
     root = np.sqrt(np.maximum(discriminant, 0)) * spheres[:, 3] * np.sqrt(a)
     t = np.where(-b - root > 0, -b - root, -b + root) / a
     t_hit = np.where((discriminant >= 0) & (t > 0), t, np.inf)

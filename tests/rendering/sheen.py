@@ -11,7 +11,7 @@ Doubles = NDArray[np.float64]
 
 #: Gauss–Legendre rule, denser at the horizon: cosines and their weights.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(96)
-COS_I, WEIGHT = ((NODES + 1) / 2)**2, WEIGHTS * (NODES + 1) / 2    # dcos = 2u du
+COS_I, WEIGHT = ((NODES + 1) / 2) ** 2, WEIGHTS * (NODES + 1) / 2  # dcos = 2u du
 
 
 def albedo(cosines: Doubles, n: float) -> Doubles:
@@ -31,7 +31,7 @@ def across(cosines: Doubles, n: float) -> Doubles:
     co, ci = np.asarray(cosines)[:, None, None], COS_I[:, None]
     along = np.sqrt((1 - co**2) * (1 - ci**2)) * np.cos(phi)
     cos_h = (co + ci) / np.sqrt(np.maximum(2 * (1 + co * ci + along), 1e-300))
-    d = (2 + n) / (2 * np.pi) * np.maximum(1 - cos_h**2, 0)**(n / 2)
+    d = (2 + n) / (2 * np.pi) * np.maximum(1 - cos_h**2, 0) ** (n / 2)
     return np.asarray(2 * np.pi * (d * ci / (4 * (co + ci - co * ci))).mean(axis=2))
 
 
@@ -40,6 +40,6 @@ def interpolated(across: int, along: int) -> Doubles:
     2·log10(roughness), by Chebyshev points.
     """
     x, y = chebyshev.chebpts1(across), chebyshev.chebpts1(along)
-    values = np.array([albedo(((x + 1) / 2)**2, 1 / 10**(r - 1)) for r in y])
+    values = np.array([albedo(((x + 1) / 2) ** 2, 1 / 10 ** (r - 1)) for r in y])
     of_y = np.linalg.solve(polynomial.polyvander(y, along - 1), values)
     return np.asarray(np.linalg.solve(polynomial.polyvander(x, across - 1), of_y.T))

@@ -42,8 +42,13 @@ def turned(w: Doubles, degrees: float) -> Doubles:
     return np.asarray(w @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T)
 
 
-def irradiance(image: NDArray[np.float32], normal: Doubles, rotation_degrees: float = 0.0, steps: int = 24,
-               where: NDArray[np.bool_] | None = None) -> Doubles:
+def irradiance(
+    image: NDArray[np.float32],
+    normal: Doubles,
+    rotation_degrees: float = 0.0,
+    steps: int = 24,
+    where: NDArray[np.bool_] | None = None,
+) -> Doubles:
     """Return ∫ L max(w·normal, 0) dω (3,), by the midpoint rule with steps² points per texel,
     over the texels in `where`.
     """

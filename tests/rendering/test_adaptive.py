@@ -39,8 +39,8 @@ def truth(device: Device, scene: Scene) -> NDArray[np.float32]:
 
 
 def test_tiles_of_a_picture_that_they_do_not_divide() -> None:
-    """Sums and pixel counts per tile equal those of a loop over the pixels if the size is not a multiple of the tile's.
-    """
+    """Sums and pixel counts per tile equal those of a loop over the pixels if the size is not a multiple of the
+    tile's."""
     rng = np.random.default_rng(1)
     values, (rows, columns) = rng.random((SIZE[1], SIZE[0], 3)), tiles_of(SIZE)
     sums, pixels, numbers = np.zeros((rows, columns)), np.zeros((rows, columns)), rng.random((rows, columns))
@@ -64,9 +64,23 @@ def test_what_is_worth_doubling(most: float) -> None:
     samples, rays = 2 ** rng.integers(4, 9, (5, 6)), rng.integers(0, 2000, (5, 6)).astype(float)
     errors = rng.exponential(size=(5, 6)) * (rng.random((5, 6)) > 0.2)
     chosen = worth_doubling(errors, rays, samples, most)
-    smooth = np.array([[(errors[y, x] + sum(errors[min(max(y + i, 0), 4), min(max(x + j, 0), 5)] for i, j in
-                                            ((-1, 0), (1, 0), (0, -1), (0, 1))) / 4) / 2
-                        for x in range(6)] for y in range(5)])
+    smooth = np.array(
+        [
+            [
+                (
+                    errors[y, x]
+                    + sum(
+                        errors[min(max(y + i, 0), 4), min(max(x + j, 0), 5)]
+                        for i, j in ((-1, 0), (1, 0), (0, -1), (0, 1))
+                    )
+                    / 4
+                )
+                / 2
+                for x in range(6)
+            ]
+            for y in range(5)
+        ]
+    )
     costs, worth = samples.ravel(), (smooth / np.maximum(rays, 1)).ravel()
     left = np.setdiff1d(np.arange(samples.size), chosen)
     assert len(set(chosen)) == len(chosen) and costs[chosen].sum() <= most
@@ -76,8 +90,8 @@ def test_what_is_worth_doubling(most: float) -> None:
 
 @pytest.mark.parametrize("scene", [room(), outdoors()], ids=["room", "outdoors"])
 def test_less_error_for_as_many_samples(device: Device, scene: Scene) -> None:
-    """Adaptive sampling has less error at equal sample count, and the estimated error is within a factor of 1.4 of it.
-    """
+    """Adaptive sampling has less error at equal sample count, and the estimated error is within a factor of 1.4 of
+    it."""
     expected, errors, told = truth(device, scene), {True: 0.0, False: 0.0}, []
     for seed in range(4):
         for adaptive in errors:
@@ -91,8 +105,8 @@ def test_less_error_for_as_many_samples(device: Device, scene: Scene) -> None:
 
 
 def test_samples_double_by_tiles(device: Device) -> None:
-    """All pixels of a tile have the same power of two of samples, tiles differ, and the total is the requested number.
-    """
+    """All pixels of a tile have the same power of two of samples, tiles differ, and the total is the requested
+    number."""
     running = renderer(device, outdoors())
     state = end(running, spp=64)
     count = state.film.pixels["count"]
@@ -117,8 +131,8 @@ def test_interrupted_and_cut_it_is_the_same_picture(device: Device, monkeypatch:
 
 @pytest.mark.parametrize("size", [SIZE, (8, 8), (12, 5)], ids=str)
 def test_it_stops_at_an_error(device: Device, size: tuple[int, int]) -> None:
-    """It stops at the requested error without planned samples, also for images of one or two tiles, doubled as a whole.
-    """
+    """It stops at the requested error without planned samples, also for images of one or two tiles, doubled as a
+    whole."""
     running = Renderer(outdoors(), device=device.info.index, size=size, seed=1, adaptive=True)
     state = end(running, error=0.01)
     assert running.stop_reason == "error" and state.noise is not None and state.noise <= 0.01 and state.spp > FLOOR_SPP

@@ -44,14 +44,19 @@ ORIGIN = np.zeros(3)
 
 def ball_on_floor(at: Doubles = ORIGIN, scale: float = 1.0) -> Scene:
     """Return a red sphere above a white floor of 2 triangles, in a constant environment, translated and scaled."""
+
     def place(p: Any) -> Any:
         return tuple((scale * np.array(p, np.float64) + at).tolist())
 
     floor = quad([place(p) for p in [(-2, -1, 2), (2, -1, 2), (2, -1, -2), (-2, -1, -2)]], Diffuse(color=(1, 1, 1)))
     camera = replace(CAMERA, position=place(CAMERA.position), look_at=place(CAMERA.look_at))
-    return Scene(meshes=[floor], spheres=[Sphere(center=place(CENTER), radius=scale * RADIUS,
-                                                 material=Diffuse(color=RED))],
-                 camera=camera, environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=SIZE))
+    return Scene(
+        meshes=[floor],
+        spheres=[Sphere(center=place(CENTER), radius=scale * RADIUS, material=Diffuse(color=RED))],
+        camera=camera,
+        environment=Environment(color=(1, 1, 1)),
+        render=RenderSettings(size=SIZE),
+    )
 
 
 def middles(size: tuple[int, int] = SIZE) -> tuple[Doubles, Doubles]:
@@ -64,12 +69,16 @@ def middles(size: tuple[int, int] = SIZE) -> tuple[Doubles, Doubles]:
     return w, np.where(inside > 0, along - np.sqrt(np.maximum(inside, 0)), np.inf)
 
 
-@pytest.mark.parametrize("at, scale", [
-    ((4e3, -3e3, 0), 1.0), ((0, 0, 0), 2.0**-40), *others(((0, 0, 0), 1.0), ((0, 0, 0), 2.0**30))], ids=str)
+@pytest.mark.parametrize(
+    "at, scale",
+    [((4e3, -3e3, 0), 1.0), ((0, 0, 0), 2.0**-40), *others(((0, 0, 0), 1.0), ((0, 0, 0), 2.0**30))],
+    ids=str,
+)
 def test_places_and_numbers_are_those_of_the_middle_s_ray(at: Any, scale: float) -> None:
     """Depth, position and ids are those of the pixel centre's ray for any filter, scene position and scale."""
-    _, found = rendered(ball_on_floor(np.array(at), scale), "depth,position,primitive,object,material",
-                        filter="blackman_harris")
+    _, found = rendered(
+        ball_on_floor(np.array(at), scale), "depth,position,primitive,object,material", filter="blackman_harris"
+    )
     w, ball = middles()
     floor = (-1 - CAMERA.position[1]) / w[..., 1]
     met = CAMERA.position + floor[..., None] * w
@@ -79,25 +88,32 @@ def test_places_and_numbers_are_those_of_the_middle_s_ray(at: Any, scale: float)
     assert missed.any() and on_floor.any() and (ball < np.inf).sum() > 20
     depth = scale * t * (w @ frame(CAMERA)[0])
     np.testing.assert_allclose(found["depth"], depth, rtol=1e-6)
-    position = np.where(missed[..., None], 0, scale * (CAMERA.position + np.where(missed, 0, t)[..., None] * w)
-                        + np.array(at))
+    position = np.where(
+        missed[..., None], 0, scale * (CAMERA.position + np.where(missed, 0, t)[..., None] * w) + np.array(at)
+    )
     np.testing.assert_allclose(found["position"], position, atol=2e-6 * scale + 1e-7 * np.abs(at).max())
     expected = np.where(missed, -1, np.where(on_floor, 0, 1))
     assert np.array_equal(found["object"], expected) and np.array_equal(found["material"], expected)
-    half = met[..., 0] > -met[..., 2]   # floor triangles: corners 0 1 2, then 0 2 3
+    half = met[..., 0] > -met[..., 2]  # floor triangles: corners 0 1 2, then 0 2 3
     assert np.array_equal(found["primitive"], np.where(missed, -1, on_floor & ~half))
 
 
 def test_numbers_count_by_objects_and_by_materials() -> None:
     """Primitive ids count triangles within their mesh, object ids meshes then spheres; equal materials share an id."""
+
     def wall(x: float, material: Any) -> Mesh:
         return quad([(x - 0.5, -2, 0), (x + 0.5, -2, 0), (x + 0.5, 2, 0), (x - 0.5, 2, 0)], material)
 
-    scene = Scene(meshes=[wall(-1, Diffuse(color=RED)), wall(0, Mirror()), wall(1, Diffuse(color=RED))],
-                  spheres=[Sphere(center=(2, 0, 0), radius=0.4, material=Dielectric()),
-                           Sphere(center=(3, 0, 0), radius=0.4, material=Mirror())],
-                  camera=Camera(position=(1, 0, 50), look_at=(1, 0, 0), fov_degrees=1.146),
-                  environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(5, 1)))
+    scene = Scene(
+        meshes=[wall(-1, Diffuse(color=RED)), wall(0, Mirror()), wall(1, Diffuse(color=RED))],
+        spheres=[
+            Sphere(center=(2, 0, 0), radius=0.4, material=Dielectric()),
+            Sphere(center=(3, 0, 0), radius=0.4, material=Mirror()),
+        ],
+        camera=Camera(position=(1, 0, 50), look_at=(1, 0, 0), fov_degrees=1.146),
+        environment=Environment(color=(1, 1, 1)),
+        render=RenderSettings(size=(5, 1)),
+    )
     _, found = rendered(scene, "object,material,primitive")
     assert found["object"].tolist() == [[0, 1, 2, 3, 4]]
     assert found["material"].tolist() == [[0, 1, 0, 2, 1]]
@@ -108,8 +124,12 @@ def test_albedo_and_normals_are_of_the_first_surface() -> None:
     """A mirror has its own albedo, and a sky no normal. Shading normals do not change the geometric normal."""
     wall = quad([(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)], Mirror(color=(0.9, 0.8, 0.5)))
     wall.normals = np.tile(np.array([0.6, 0.0, 0.8], np.float32), (4, 1))
-    scene = Scene(meshes=[wall], environment=Environment(color=(2, 2, 2)), render=RenderSettings(size=(3, 2)),
-                  camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
+    scene = Scene(
+        meshes=[wall],
+        environment=Environment(color=(2, 2, 2)),
+        render=RenderSettings(size=(3, 2)),
+        camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20),
+    )
     _, found = rendered(scene, "albedo,normal,geometric_normal", integrator="depth")
     for name, expected in (("albedo", (0.9, 0.8, 0.5)), ("normal", (0.6, 0, 0.8)), ("geometric_normal", (0, 0, 1))):
         np.testing.assert_allclose(found[name], np.broadcast_to(expected, (2, 3, 3)), rtol=1e-6, atol=1e-7)
@@ -122,33 +142,47 @@ def test_textures_and_normal_maps_are_seen() -> None:
     """Albedo is that of the texels; normal maps bend the normal but not the geometric one; materials are left out of
     the program if no AOV needs them.
     """
+
     def plain(*rgb: int) -> Texture:
         return Texture(picture=Picture(np.full((2, 2, 4), (*rgb, 255), np.uint8)))
 
-    wall = quad([(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)],
-                Diffuse(color=plain(255, 0, 255), normal_map=plain(204, 128, 204)))
+    wall = quad(
+        [(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)],
+        Diffuse(color=plain(255, 0, 255), normal_map=plain(204, 128, 204)),
+    )
     wall.uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
-    scene = Scene(meshes=[wall], environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(3, 2)),
-                  camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
+    scene = Scene(
+        meshes=[wall],
+        environment=Environment(color=(1, 1, 1)),
+        render=RenderSettings(size=(3, 2)),
+        camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20),
+    )
     bent = np.array([204, 128, 204]) / 127.5 - 1
     for names in ("albedo,normal,geometric_normal", "normal"):
         _, found = rendered(scene, names, integrator="depth")
         expected: dict[str, Any] = {
-            "albedo": (1, 0, 1), "normal": bent / np.linalg.norm(bent), "geometric_normal": (0, 0, 1)}
+            "albedo": (1, 0, 1),
+            "normal": bent / np.linalg.norm(bent),
+            "geometric_normal": (0, 0, 1),
+        }
         for name, aov in found.items():
             np.testing.assert_allclose(aov, np.broadcast_to(expected[name], (2, 3, 3)), atol=1e-6)
 
 
 def test_what_is_not_there_is_looked_through() -> None:
     """AOVs see through a pane of opacity 0 and a one-sided pane's back, with the depth of the surface behind."""
+
     def wall(z: float, material: Diffuse) -> Mesh:
         return quad([(-2, -2, z), (2, -2, z), (2, 2, z), (-2, 2, z)], material)
 
     back = wall(0.2, Diffuse(one_sided=True))
     back.faces = back.faces[:, ::-1].copy()
-    scene = Scene(meshes=[wall(0.5, Diffuse(opacity=0.0)), back, wall(-1, Diffuse(color=RED))],
-                  environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(3, 2)),
-                  camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
+    scene = Scene(
+        meshes=[wall(0.5, Diffuse(opacity=0.0)), back, wall(-1, Diffuse(color=RED))],
+        environment=Environment(color=(1, 1, 1)),
+        render=RenderSettings(size=(3, 2)),
+        camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20),
+    )
     _, found = rendered(scene, "object,depth,position,albedo", integrator="depth")
     assert np.all(found["object"] == 2)
     np.testing.assert_allclose(found["depth"], 1.9, rtol=1e-6)
@@ -159,16 +193,21 @@ def test_what_is_not_there_is_looked_through() -> None:
 def test_albedo_is_a_mean_over_the_pixel() -> None:
     """The pixel mean of the albedo of a wall that covers half of the middle column."""
     half = quad([(-2, -2, -1), (0, -2, -1), (0, 2, -1), (-2, 2, -1)], Diffuse(color=RED))
-    scene = Scene(meshes=[half], environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(5, 3)),
-                  camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
+    scene = Scene(
+        meshes=[half],
+        environment=Environment(color=(1, 1, 1)),
+        render=RenderSettings(size=(5, 3)),
+        camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20),
+    )
     _, found = rendered(scene, "albedo", integrator="depth")
     np.testing.assert_allclose(found["albedo"][:, 2], np.tile(np.multiply(RED, 0.5), (3, 1)), rtol=0.13)
     np.testing.assert_allclose(found["albedo"][:, :2], np.broadcast_to(RED, (3, 2, 3)), rtol=1e-6)
     assert not found["albedo"][:, 3:].any()
 
 
-@pytest.mark.parametrize("options", [
-    {}, *others({"adaptive": True}, {"lanes": 1, "filter": "blackman_harris"})], ids=str)
+@pytest.mark.parametrize(
+    "options", [{}, *others({"adaptive": True}, {"lanes": 1, "filter": "blackman_harris"})], ids=str
+)
 def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]) -> None:
     """Direct and indirect light sum to the image exactly, and the image is the same without these AOVs. Direct light is
     that of paths of depth 2, so it equals the image of max_depth 2 from the same samples."""
@@ -182,9 +221,14 @@ def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]
         np.testing.assert_allclose(found["direct"], shallow, rtol=1e-6, atol=np.spacing(pixels.max()))
 
 
-@pytest.mark.parametrize("camera", [
-    {"aperture_radius": 0.3, "focus_distance": 2.0},
-    *others({"projection": "orthographic"}, {"projection": "equirectangular"})], ids=str)
+@pytest.mark.parametrize(
+    "camera",
+    [
+        {"aperture_radius": 0.3, "focus_distance": 2.0},
+        *others({"projection": "orthographic"}, {"projection": "equirectangular"}),
+    ],
+    ids=str,
+)
 def test_depth_is_what_the_integrator_of_it_shows(camera: dict[str, Any]) -> None:
     """The depth AOV equals the depth integrator's image for every camera; with a lens it uses
     the ray through its centre.
@@ -217,7 +261,7 @@ def test_variance_is_that_of_the_mean() -> None:
     runs = [rendered(scene, "variance,samples", 16, seed=seed) for seed in range(200)]
     measured = np.var([pixels for pixels, _ in runs], axis=0, ddof=1, dtype=np.float64)
     told = np.mean([found["variance"] for _, found in runs], axis=0, dtype=np.float64)
-    assert told.mean() == pytest.approx(measured.mean(), rel=0.05)   # 0.1 for each of 48 pixels; channels are alike
+    assert told.mean() == pytest.approx(measured.mean(), rel=0.05)  # 0.1 for each of 48 pixels; channels are alike
     assert all(np.all(found["samples"] == 16) for _, found in runs)
     assert np.all(np.isnan(rendered(scene, "variance", 1)[1]["variance"]))
 

@@ -24,8 +24,10 @@ SAMPLES = 1 << 15
 OTHERWISE = {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"}
 #: Kernel text and replacements that make it slightly wrong: densities, sampled directions, and a value.
 WRONG = {
-    "density of the microfacets": ("facets / (1.0f + ggx_lambda(wo, m->alpha))",
-                                   "facets / (1.05f + ggx_lambda(wo, m->alpha))"),
+    "density of the microfacets": (
+        "facets / (1.0f + ggx_lambda(wo, m->alpha))",
+        "facets / (1.05f + ggx_lambda(wo, m->alpha))",
+    ),
     "density of the cosine": ("shares.diffuse * cosine_pdf(wi.z)", "shares.diffuse * (0.5f / PI)"),
     "density of further bounces": ("cos_theta * cos_theta + m->alpha", "cos_theta * cos_theta + 1.5f * m->alpha"),
     "shares of the lobes": ("choose(lobe < share.specular,", "choose(lobe < 0.9f * share.specular,"),
@@ -45,14 +47,16 @@ def taken() -> list[tuple[Material, float]]:
     for material, cosine in cases():
         if "TRANSMISSION" in material.features():
             through.setdefault(material, []).append(cosine)
-    kept = {material: cosines[i % min(3, len(cosines))::3] for i, (material, cosines) in enumerate(through.items())}
+    kept = {material: cosines[i % min(3, len(cosines)) :: 3] for i, (material, cosines) in enumerate(through.items())}
     return [(material, cosine) for material, cosine in cases() if cosine in kept.get(material, [cosine])]
 
 
 @pytest.fixture(scope="module")
 def found(every: Bsdfs) -> list[Scattered]:
-    return [scatter(every, every.materials.index(material), cosine, SAMPLES, seed)
-            for seed, (material, cosine) in enumerate(taken())]
+    return [
+        scatter(every, every.materials.index(material), cosine, SAMPLES, seed)
+        for seed, (material, cosine) in enumerate(taken())
+    ]
 
 
 def test_samples_follow_the_density(found: list[Scattered]) -> None:
@@ -82,8 +86,10 @@ def test_densities_are_one_over_the_area_of_the_map(every: Bsdfs) -> None:
     single-lobe materials are included.
     """
     some = [(material, cosine) for material, cosine in cases() if not material.is_specular]
-    checked = {f"{cosine:.2g} {material}": check_density(every, every.materials.index(material), cosine)
-               for material, cosine in some}
+    checked = {
+        f"{cosine:.2g} {material}": check_density(every, every.materials.index(material), cosine)
+        for material, cosine in some
+    }
     assert not {name: check for name, check in checked.items() if not check.error <= AREA}
     assert sum(check.known for check in checked.values()) > 200 * len(checked)
     assert sum(check.lobes == 1 and check.known > 100 for check in checked.values()) > 20
@@ -142,8 +148,10 @@ def test_cook_torrance(every: Bsdfs) -> None:
 @pytest.mark.parametrize("what", WRONG)
 def test_what_is_wrong_by_little_is_rejected(device: Device, what: str) -> None:
     """The tests above can fail: each of these errors of a few per cent is detected for at least one material."""
-    materials: list[Material] = [MetallicRoughness(roughness=0.9, metallic=metallic, color=(1.0, 0.5, 0.2),
-                                                   multiple_scattering=True) for metallic in (0.0, 1.0)]
+    materials: list[Material] = [
+        MetallicRoughness(roughness=0.9, metallic=metallic, color=(1.0, 0.5, 0.2), multiple_scattering=True)
+        for metallic in (0.0, 1.0)
+    ]
     wrong = bsdfs(device, materials, dict([WRONG[what]]))
     found = [scatter(wrong, i, cosine, 4 * SAMPLES, 1) for i in (0, 1) for cosine in (0.6, 0.1)]
     assert rejected({case.name: case.density for case in found}, 1e-9)
@@ -173,8 +181,9 @@ def test_registry_is_covered() -> None:
     """
     materials = [material for material, _ in taken()]
     assert set(materials) == {material for material, _ in cases()}
-    angles = [{cosine for material, cosine in some if "TRANSMISSION" in material.features()}
-              for some in (taken(), cases())]
+    angles = [
+        {cosine for material, cosine in some if "TRANSMISSION" in material.features()} for some in (taken(), cases())
+    ]
     assert angles[0] == angles[1]
     assert {type(material) for material in materials} == set(MATERIALS)
     metals = [material for material in materials if isinstance(material, MetallicRoughness)]

@@ -27,8 +27,9 @@ def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @covering("stops, adaptive", [{"spp": 40}, {"error": 0.1}], [False, True])
-def test_interrupted_again_and_again(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
-                                     stops: dict[str, float]) -> None:
+def test_interrupted_again_and_again(
+    device: Device, tmp_path: Path, small_launches: None, adaptive: bool, stops: dict[str, float]
+) -> None:
     """Resume with a new renderer every few launches, inside and between passes; 40 samples are more than planned."""
     at_once = renderer(device, adaptive=adaptive)
     run(at_once, **stops)
@@ -65,8 +66,9 @@ def interrupt_after(running: Renderer, launches: int) -> None:
 
 
 @pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
-def test_from_whatever_was_written_on_the_way(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
-                                              monkeypatch: pytest.MonkeyPatch) -> None:
+def test_from_whatever_was_written_on_the_way(
+    device: Device, tmp_path: Path, small_launches: None, adaptive: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also where nobody asked it to stop: checkpoints from all over the render lead to the same end."""
     monkeypatch.setattr("clrt.rendering.checkpoint.checkpoints.COST", 0)
     path: Path = tmp_path / "a.ck"
@@ -82,7 +84,7 @@ def test_from_whatever_was_written_on_the_way(device: Device, tmp_path: Path, sm
     checkpoints = list(written)
     assert len(checkpoints) > 20
     in_hand = 0
-    for content in checkpoints[::len(checkpoints) // 8]:
+    for content in checkpoints[:: len(checkpoints) // 8]:
         path.write_bytes(content)
         running = renderer(device, adaptive=adaptive, checkpoint=path, resume=True, checkpoint_seconds=1e9)
         in_hand += bool(running.session.work.parts)
@@ -99,9 +101,15 @@ def test_without_one_yet_it_begins(device: Device, tmp_path: Path, caplog: pytes
     assert "will be replaced" in caplog.text
 
 
-@pytest.mark.parametrize("options, error", [
-    ({"resume": True}, UsageError), ({"checkpoint": "no/such/folder/a.ck"}, OutputError),
-    ({"checkpoint": "/"}, OutputError), ({"checkpoint": "a.ck", "checkpoint_seconds": float("nan")}, UsageError)])
+@pytest.mark.parametrize(
+    "options, error",
+    [
+        ({"resume": True}, UsageError),
+        ({"checkpoint": "no/such/folder/a.ck"}, OutputError),
+        ({"checkpoint": "/"}, OutputError),
+        ({"checkpoint": "a.ck", "checkpoint_seconds": float("nan")}, UsageError),
+    ],
+)
 def test_mistakes(device: Device, options: dict[str, Any], error: type[ClrtError]) -> None:
     with pytest.raises(error):
         renderer(device, **options)
@@ -146,8 +154,9 @@ def test_left_by_break(device: Device, tmp_path: Path, adaptive: bool) -> None:
 
 
 @covering("launches, adaptive", [3, 17, 40, *range(5, 12)], [False, True])
-def test_left_by_a_keyboard_interrupt(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
-                                      launches: int) -> None:
+def test_left_by_a_keyboard_interrupt(
+    device: Device, tmp_path: Path, small_launches: None, adaptive: bool, launches: int
+) -> None:
     """It is raised while waiting for a launch, in the middle of a pass or at its last launch."""
     left = renderer(device, adaptive=adaptive, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e9)
     raise_after(left, launches)

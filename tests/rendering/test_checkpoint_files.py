@@ -54,11 +54,11 @@ def test_a_render_that_ended_stays_as_it_is(device: Device, kept: Path) -> None:
 
 def _flipped(content: bytes, rng: np.random.Generator) -> bytes:
     at = int(rng.integers(len(content))) if rng.random() < 0.5 else int(rng.integers(600))
-    return content[:at] + bytes([content[at] ^ 1 << int(rng.integers(8))]) + content[at + 1:]
+    return content[:at] + bytes([content[at] ^ 1 << int(rng.integers(8))]) + content[at + 1 :]
 
 
 def _cut(content: bytes, rng: np.random.Generator) -> bytes:
-    return content[:int(rng.integers(len(content)))]
+    return content[: int(rng.integers(len(content)))]
 
 
 def _longer(content: bytes, rng: np.random.Generator) -> bytes:
@@ -96,33 +96,68 @@ def test_the_whole_generation_outlives_the_damaged_one(device: Device, kept: Pat
     """An intact generation is not replaced by an unreadable file, and is found if a crash left only it."""
     whole = older(kept).read_bytes()
     kept.write_bytes(b"damaged")
-    running = renderer(device, checkpoint=kept, resume=True, checkpoint_seconds=60.0)    # so only at its end
+    running = renderer(device, checkpoint=kept, resume=True, checkpoint_seconds=60.0)  # so only at its end
     run(running, spp=24)
     assert older(kept).read_bytes() == whole and same(running, renderer(device, checkpoint=kept, resume=True))
     kept.unlink()
     assert run(renderer(device, checkpoint=kept, resume=True), spp=16).spp == 16
 
 
-@pytest.mark.parametrize("changes", [
-    {"planned_spp": -1}, {"planned_spp": 1.5}, {"seconds": -1.0}, {"seconds": "1"}, {"seconds": None}, {"facts": []},
-    {"film": np.zeros((44, 60), KINDS["film"])}, {"samples": np.full((6, 8), -1)}, {"then": np.zeros((6, 8), np.int64)},
-    {"then": np.full((6, 8), 1 << 62)}, {"tiles": np.array([48], np.uint32)}, {"tiles": np.zeros((1, 1), np.uint32)},
-    {"parts": np.array([[0, 99, 24, 1]])}, {"parts": np.zeros((1, 4), np.int64)}, {"parts": np.zeros((3,), np.int64)},
-    {"noise_level": np.full((6, 8), 60)}, {"noise_level": np.zeros((0, 0), np.int64)},
-    {"noise_mean": np.zeros((0, 0, 3), np.float32)}, {"noise_changes": np.zeros((5, 2, 8, 6))},
-    {"history": np.full((1, 4), np.nan)}, {"history": np.zeros((4,))}], ids=lambda changes: next(iter(changes)))
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"planned_spp": -1},
+        {"planned_spp": 1.5},
+        {"seconds": -1.0},
+        {"seconds": "1"},
+        {"seconds": None},
+        {"facts": []},
+        {"film": np.zeros((44, 60), KINDS["film"])},
+        {"samples": np.full((6, 8), -1)},
+        {"then": np.zeros((6, 8), np.int64)},
+        {"then": np.full((6, 8), 1 << 62)},
+        {"tiles": np.array([48], np.uint32)},
+        {"tiles": np.zeros((1, 1), np.uint32)},
+        {"parts": np.array([[0, 99, 24, 1]])},
+        {"parts": np.zeros((1, 4), np.int64)},
+        {"parts": np.zeros((3,), np.int64)},
+        {"noise_level": np.full((6, 8), 60)},
+        {"noise_level": np.zeros((0, 0), np.int64)},
+        {"noise_mean": np.zeros((0, 0, 3), np.float32)},
+        {"noise_changes": np.zeros((5, 2, 8, 6))},
+        {"history": np.full((1, 4), np.nan)},
+        {"history": np.zeros((4,))},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
 def test_what_does_not_fit_is_damage(device: Device, kept: Path, changes: dict[str, Any]) -> None:
     """Sizes and numbers are validated even if the checksum is right."""
     header, arrays = read_checkpoint(kept, KINDS)
     older(kept).unlink()
-    _rewrite(kept, {**header, **{name: value for name, value in changes.items() if name not in arrays}},
-             {name: changes.get(name, array) for name, array in arrays.items()})
+    _rewrite(
+        kept,
+        {**header, **{name: value for name, value in changes.items() if name not in arrays}},
+        {name: changes.get(name, array) for name, array in arrays.items()},
+    )
     with pytest.raises(CheckpointError, match="damaged"):
         renderer(device, checkpoint=kept, resume=True)
 
 
-@pytest.mark.parametrize("line", [b"", b"[]", b"{}", b'{"header": 3, "shapes": 4}', b"[" * 9000, b"1" * 9000,
-                                  b'{"header": {}, "shapes": {"film": [1e999]}}', b"\xff", b"x" * 99999], ids=repr)
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"",
+        b"[]",
+        b"{}",
+        b'{"header": 3, "shapes": 4}',
+        b"[" * 9000,
+        b"1" * 9000,
+        b'{"header": {}, "shapes": {"film": [1e999]}}',
+        b"\xff",
+        b"x" * 99999,
+    ],
+    ids=repr,
+)
 def test_headers_that_are_none(device: Device, kept: Path, line: bytes) -> None:
     older(kept).unlink()
     kept.write_bytes(MAGIC + line + b"\n" + hashlib.sha256(MAGIC + line + b"\n").digest())
@@ -147,13 +182,24 @@ def _rewrite(path: Path, header: dict[str, Any], arrays: dict[str, Any]) -> None
     path.write_bytes(content + hashlib.sha256(content).digest())
 
 
-@pytest.mark.parametrize("other, named", [
-    ({"clamp_direct": 2.0}, "clamp_direct 0.0 instead of 2.0"), ({"clamp_indirect": 0.5}, "clamp_indirect 0.0 instead"),
-    ({"back_face_culling": "all"}, "back_face_culling none instead of all"),
-    ({"seed": 2}, "seed 1 instead of 2"), ({"size": (44, 61)}, "size 61x44 instead of 44x61"),
-    ({"max_depth": 2}, "max_depth"), ({"integrator": "direct"}, "integrator"), ({"filter": "tent"}, "filter"),
-    ({"sampler": "independent"}, "sampler"), ({"adaptive": True}, "adaptive False instead of True"),
-    ({"triangle": "moller_trumbore"}, "triangle"), ({"offset": "ulp"}, "offset")], ids=lambda value: str(value)[:30])
+@pytest.mark.parametrize(
+    "other, named",
+    [
+        ({"clamp_direct": 2.0}, "clamp_direct 0.0 instead of 2.0"),
+        ({"clamp_indirect": 0.5}, "clamp_indirect 0.0 instead"),
+        ({"back_face_culling": "all"}, "back_face_culling none instead of all"),
+        ({"seed": 2}, "seed 1 instead of 2"),
+        ({"size": (44, 61)}, "size 61x44 instead of 44x61"),
+        ({"max_depth": 2}, "max_depth"),
+        ({"integrator": "direct"}, "integrator"),
+        ({"filter": "tent"}, "filter"),
+        ({"sampler": "independent"}, "sampler"),
+        ({"adaptive": True}, "adaptive False instead of True"),
+        ({"triangle": "moller_trumbore"}, "triangle"),
+        ({"offset": "ulp"}, "offset"),
+    ],
+    ids=lambda value: str(value)[:30],
+)
 def test_other_settings_are_refused(device: Device, kept: Path, other: dict[str, Any], named: str) -> None:
     with pytest.raises(CheckpointError) as refused:
         renderer(device, checkpoint=kept, resume=True, **other)
@@ -184,11 +230,11 @@ def test_other_scenes_and_kernels_are_refused(device: Device, kept: Path, monkey
     mesh, *others = scene.meshes
     moved = replace(mesh, vertices=mesh.vertices + np.float32(1e-6))
     for changed, named in [
-            (replace(scene, camera=replace(scene.camera, fov_degrees=41.0)), "different camera"),
-            (replace(scene, meshes=[moved, *others]), "different meshes"),
-            (replace(scene, meshes=[replace(mesh, material=Diffuse(color=(0.1, 0.2, 0.3))), *others]),
-             "different meshes"),
-            (replace(scene, environment=replace(scene.environment, strength=2.0)), "different environment")]:
+        (replace(scene, camera=replace(scene.camera, fov_degrees=41.0)), "different camera"),
+        (replace(scene, meshes=[moved, *others]), "different meshes"),
+        (replace(scene, meshes=[replace(mesh, material=Diffuse(color=(0.1, 0.2, 0.3))), *others]), "different meshes"),
+        (replace(scene, environment=replace(scene.environment, strength=2.0)), "different environment"),
+    ]:
         with pytest.raises(CheckpointError, match=rf"another render \({named}\)"):
             renderer(device, changed, checkpoint=kept, resume=True)
     renamed = replace(scene, name="x", meshes=[replace(mesh, name="y"), *others])

@@ -33,13 +33,24 @@ def clamped(scene: Scene, direct: float = 0.0, indirect: float = 0.0, **settings
 
 
 @pytest.mark.parametrize("lanes", [1, 8])
-@pytest.mark.parametrize("balls, edges", [
-    ([], 1), ([Sphere(material=Diffuse(color=(0, 0, 0), emission=(1, 2, 4)))], 1), ([Sphere(material=Mirror())], 2),
-    ([Sphere(material=Dielectric(ior=1.0))], 3)], ids=["sky", "emitter", "mirror", "passage"])
+@pytest.mark.parametrize(
+    "balls, edges",
+    [
+        ([], 1),
+        ([Sphere(material=Diffuse(color=(0, 0, 0), emission=(1, 2, 4)))], 1),
+        ([Sphere(material=Mirror())], 2),
+        ([Sphere(material=Dielectric(ior=1.0))], 3),
+    ],
+    ids=["sky", "emitter", "mirror", "passage"],
+)
 def test_light_that_is_all_of_a_sample(device: Device, balls: list[Sphere], edges: int, lanes: int) -> None:
     """A sky seen directly, in a mirror, or through two surfaces: direct up to depth 2, indirect beyond."""
-    scene = Scene(spheres=balls, environment=Environment(color=(1, 2, 4)), camera=Camera(fov_degrees=5),
-                  render=RenderSettings(size=(8, 8), spp=2, max_depth=4))
+    scene = Scene(
+        spheres=balls,
+        environment=Environment(color=(1, 2, 4)),
+        camera=Camera(fov_degrees=5),
+        render=RenderSettings(size=(8, 8), spp=2, max_depth=4),
+    )
     for direct, indirect in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (3.0, 0.5), (9.0, 9.0)):
         limit = (direct if edges <= 2 else indirect) or np.inf
         found = film(device, clamped(scene, direct, indirect), lanes=lanes)
@@ -53,6 +64,7 @@ def test_what_is_left_and_what_was_taken_are_the_picture(device: Device, lanes: 
     """Paths are the same with and without clamps: no pixel is brighter, and result plus removed
     light equals the original.
     """
+
     def grey(found: Film) -> Any:
         return found.mean.mean(axis=2)
 
@@ -78,8 +90,10 @@ def test_the_report_names_the_bias(device: Device) -> None:
     report = clrt.render(scene, clamp_direct=1.0, **chosen).report
     assert (report["biased_by"], report["clamp_direct"], report["clamp_indirect"]) == (["clamp_direct"], 1.0, 0.0)
     assert report["clamped_part"] == pytest.approx(0.75)
-    assert report["warnings"] == ["the image is biased by clamp_direct: 75.00% of the light was removed; the "
-                                  "estimated error does not include this bias"]
+    assert report["warnings"] == [
+        "the image is biased by clamp_direct: 75.00% of the light was removed; the "
+        "estimated error does not include this bias"
+    ]
     others: list[tuple[float, Integrator]] = [(0.0, "path"), (1.0, "local")]
     for clamp, integrator in others:
         report = clrt.render(scene, clamp_direct=clamp, integrator=integrator, **chosen).report

@@ -53,7 +53,7 @@ def around(n: Doubles) -> Doubles:
 
 
 def schlick(cosine: Doubles) -> Doubles:
-    return np.asarray(0.04 + 0.96 * (1 - np.abs(cosine))**5)
+    return np.asarray(0.04 + 0.96 * (1 - np.abs(cosine)) ** 5)
 
 
 def film(wo: Doubles, wi: Doubles, n: Doubles, alpha: float) -> Doubles:
@@ -62,7 +62,7 @@ def film(wo: Doubles, wi: Doubles, n: Doubles, alpha: float) -> Doubles:
     cos_h, cos_o, cos_i = h @ n, np.broadcast_to(wo @ n, len(wi)), wi @ n
     lit = (cos_o > 0) & (cos_i > 0)
     cos_o, cos_i = np.where(lit, cos_o, 1), np.where(lit, cos_i, 1)
-    d = alpha**2 / (np.pi * (1 - cos_h**2 + (alpha * cos_h)**2)**2)
+    d = alpha**2 / (np.pi * (1 - cos_h**2 + (alpha * cos_h) ** 2) ** 2)
     g = masking("height_correlated", alpha, cos_o, cos_i)
     return np.where(lit, schlick(np.sum(h * wi, axis=-1)) * d * g / (4 * cos_o), 0)
 
@@ -70,16 +70,21 @@ def film(wo: Doubles, wi: Doubles, n: Doubles, alpha: float) -> Doubles:
 @pytest.mark.parametrize("metallic", [0.5, 1.0])
 @pytest.mark.parametrize("base", [None, "right", "steep"])
 @pytest.mark.parametrize("coat", [None, "up", "steep"])
-def test_coat_and_base_have_normals_of_their_own(device: Device, base: str | None, coat: str | None,
-                                                 metallic: float) -> None:
+def test_coat_and_base_have_normals_of_their_own(
+    device: Device, base: str | None, coat: str | None, metallic: float
+) -> None:
     """eval is coat·film plus the attenuated base, each with its own normal's cosines, for wi and its mirror image
     below the surface; 0 below. A base that is not all gloss is compared only where nothing goes to the mirror image.
 
     A material with both maps is included, so that all cases run the same program.
     """
     bare = MetallicRoughness(color=COLOR, roughness=0.7, metallic=metallic)
-    coats = [replace(bare, clearcoat=0.8, clearcoat_roughness=0.5, normal_map=texture(one),
-                     clearcoat_normal_map=texture(other)) for one, other in ((base, coat), ("right", "up"))]
+    coats = [
+        replace(
+            bare, clearcoat=0.8, clearcoat_roughness=0.5, normal_map=texture(one), clearcoat_normal_map=texture(other)
+        )
+        for one, other in ((base, coat), ("right", "up"))
+    ]
     f0: Any = tuple(0.04 + metallic * (c - 0.04) for c in COLOR)
     gloss = replace(bare, color=f0, metallic=1.0, multiple_scattering=False)
     both = bsdfs(device, [gloss, *coats])
@@ -105,15 +110,18 @@ def test_coat_and_base_have_normals_of_their_own(device: Device, base: str | Non
     assert np.all(np.abs(found - expected)[sharp] <= (roundings * np.abs(expected) + 2e-5)[sharp])
     assert not both.value(1, wo, wi * FLIP)[0].any()
     if metallic == 1 and base and base != coat:
-        assert np.count_nonzero((wi @ base_normal < 0) & (found[:, 0] > 0)) > 50     # the film alone
+        assert np.count_nonzero((wi @ base_normal < 0) & (found[:, 0] > 0)) > 50  # the film alone
 
 
 def varied() -> list[MetallicRoughness]:
     """Return coats and bases with different normals, alone and with everything else that a coat can cover."""
     layers: dict[str, Any] = {"sheen_color": (0.4, 0.5, 0.6), "sheen_roughness": 0.5, "transmission": 0.6}
     white: dict[str, Any] = {"color": (1.0, 1.0, 1.0), "roughness": 0.6, "clearcoat": 1.0, "clearcoat_roughness": 0.6}
-    maps: list[dict[str, Any]] = [{"normal_map": texture("steep")}, {"clearcoat_normal_map": texture("steep")},
-                                  {"normal_map": texture("right"), "clearcoat_normal_map": texture("up")}]
+    maps: list[dict[str, Any]] = [
+        {"normal_map": texture("steep")},
+        {"clearcoat_normal_map": texture("steep")},
+        {"normal_map": texture("right"), "clearcoat_normal_map": texture("up")},
+    ]
     return [MetallicRoughness(**white, **bent, **more) for bent in maps for more in ({"metallic": 1.0}, {}, layers)]
 
 
@@ -140,7 +148,7 @@ def test_samples_follow_the_density_and_make_no_light(device: Device) -> None:
             shares = np.array([*expected, max(1 - expected.sum(), 0)])
             chi2[name] = chi2_test([*found, count - kept.sum()], count * shares + 1e-9)
             there, again = every.value(which, wo, wi[kept])
-            sure = np.abs(again / pdf[kept] - 1) < 1e-4     # A few lie on a horizon
+            sure = np.abs(again / pdf[kept] - 1) < 1e-4  # A few lie on a horizon
             assert sure.mean() > 0.999
             np.testing.assert_allclose((weight[kept] * pdf[kept, None])[sure], there[sure], rtol=2e-4, atol=1e-6)
             assert weight.mean() == pytest.approx(value.mean() * 4 * np.pi, rel=0.03)
@@ -154,12 +162,17 @@ def test_each_lobe_is_reciprocal(device: Device) -> None:
     """Each lobe is divided by its own normal's cosine: the film over a black base, and the base below a smooth film,
     where neither reflects below the surface."""
     maps: dict[str, Any] = {"normal_map": texture("right"), "clearcoat_normal_map": texture("up"), "clearcoat": 1.0}
-    black, body = MetallicRoughness(color=(0.0,) * 3, specular=0.0, clearcoat_roughness=0.7, **maps), MetallicRoughness(
-        color=COLOR, roughness=0.8, sheen_color=(0.3,) * 3, sheen_roughness=0.6, clearcoat_roughness=0.0, **maps)
+    black, body = (
+        MetallicRoughness(color=(0.0,) * 3, specular=0.0, clearcoat_roughness=0.7, **maps),
+        MetallicRoughness(
+            color=COLOR, roughness=0.8, sheen_color=(0.3,) * 3, sheen_roughness=0.6, clearcoat_roughness=0.0, **maps
+        ),
+    )
     both, wo, wi = bsdfs(device, [black, body]), above(5000, 3), above(5000, 4)
     for which, n in ((0, normal("up")), (1, normal("right"))):
         kept = (np.minimum(wo @ normal("up"), wi @ normal("up")) > 0.02) & (
-            np.minimum(wo @ normal("right"), wi @ normal("right")) > 0.02)
+            np.minimum(wo @ normal("right"), wi @ normal("right")) > 0.02
+        )
         h = (wo + wi) / np.linalg.norm(wo + wi, axis=1, keepdims=True)
         kept &= np.maximum((wo * FLIP) @ n, (wi * FLIP) @ n) < 0
         kept &= (h @ normal("up") < 0.98) if which else kept
@@ -182,8 +195,11 @@ def test_highlights_lie_where_the_coat_is_bent_to(device: Device, base: str | No
         light = mirrored + turn * np.cross(mirrored, [1.0, 0.0, 0.0])
         light /= np.linalg.norm(light)
         balls = [Sphere(center=(0, 0, -9), radius=1, material=Dielectric())] if beside == "glass" else []
-        scene = Scene(meshes=[quad(coated)], spheres=balls,
-                      lights=[DirectionalLight(direction=tuple(-light), irradiance=(1, 1, 1))])
+        scene = Scene(
+            meshes=[quad(coated)],
+            spheres=balls,
+            lights=[DirectionalLight(direction=tuple(-light), irradiance=(1, 1, 1))],
+        )
         picture = seen(device, scene, size=8, spp=4, max_depth=2).mean(axis=(0, 1))
         gloss = film(towards_eye, light[None], n, alpha) + film(towards_eye, light[None] * FLIP, n, alpha)
         left = np.prod(coat_left(np.array([n[2], light @ n]))) / mean(coat_left)
@@ -198,8 +214,10 @@ def test_a_smooth_coat_has_no_bumps(device: Device) -> None:
     """In a constant environment the coat reflects 0.04 of it, even if the base's normal map is steep."""
     black = MetallicRoughness(color=(0.0,) * 3, specular=0.0, clearcoat=1.0)
     sky = Environment(color=(1, 1, 1))
-    smooth, bent = (seen(device, Scene(meshes=[quad(replace(black, normal_map=bumps))], environment=sky), spp=16)
-                    for bumps in (None, texture("steep")))
+    smooth, bent = (
+        seen(device, Scene(meshes=[quad(replace(black, normal_map=bumps))], environment=sky), spp=16)
+        for bumps in (None, texture("steep"))
+    )
     assert smooth.mean() == pytest.approx(0.04, rel=1e-3) and np.abs(bent - smooth).max() < 1e-3
 
 

@@ -33,8 +33,12 @@ def received(device: Device, integrator: Integrator, meshes: list[Mesh], spheres
     """Return the mean radiance of a grey floor below these emitters."""
     floor = Mesh(np.array([[-9, 0, 9], [9, 0, 9], [9, 0, -9], [-9, 0, -9]], np.float32), FACES, Diffuse())
     camera = Camera(position=(0.0, 0.4, 0.0), look_at=(0.2, 0.0, 0.1), fov_degrees=30.0)
-    scene = Scene(meshes=[floor, *meshes], spheres=spheres or [], camera=camera,
-                  render=RenderSettings(size=(16, 16), max_depth=2, integrator=integrator))
+    scene = Scene(
+        meshes=[floor, *meshes],
+        spheres=spheres or [],
+        camera=camera,
+        render=RenderSettings(size=(16, 16), max_depth=2, integrator=integrator),
+    )
     return float(film(device, scene, 64).mean.mean())
 
 
@@ -64,8 +68,12 @@ def test_a_sheet_that_coincides_with_an_emitter(device: Device, integrator: Inte
     assert received(device, integrator, [emitter, sheet]) == pytest.approx(full, rel=0.02)
 
 
-@given(st.lists(st.tuples(st.sampled_from([0.0, -0.0, 1.0, 1.0 + 2**-52]), st.sampled_from([0.0, 2.0]), st.booleans()),
-                max_size=20))
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([0.0, -0.0, 1.0, 1.0 + 2**-52]), st.sampled_from([0.0, 2.0]), st.booleans()),
+        max_size=20,
+    )
+)
 def test_hidden_by_an_earlier_one(rows: list[tuple[float, float, bool]]) -> None:
     shapes, opaque = np.array([row[:2] for row in rows]).reshape(-1, 2), np.array([row[2] for row in rows], bool)
     expected = [any(opaque[i] and (shapes[i] == shapes[j]).all() for i in range(j)) for j in range(len(rows))]

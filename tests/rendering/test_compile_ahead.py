@@ -25,7 +25,7 @@ from clrt.threads import beside
 
 SCENES = Path(__file__).parents[2] / "scenes"
 MODEL = SCENES / "models" / "dragon.ply"
-POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # the copy that pip installs
+POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))  # the copy that pip installs
 
 
 @pytest.mark.parametrize("name", ["dragon", "depth_of_field", "sunlit", "night", "spot", "mirrors", "local", "tree"])
@@ -40,11 +40,22 @@ def test_an_outline_has_the_scene_s_program(device: Device, name: str) -> None:
 
 def test_each_program_is_compiled_once(tmp_path: Path) -> None:
     """A render compiles two programs, the BVH builder's and the scene's, and a second render none."""
-    places = {"PATH": os.environ["PATH"], "HOME": str(tmp_path), "CLRT_CACHE_DIR": str(tmp_path / "cache"),
-              "POCL_CACHE_DIR": str(tmp_path / "kept"), "OCL_ICD_VENDORS": str(POCL)}
+    places = {
+        "PATH": os.environ["PATH"],
+        "HOME": str(tmp_path),
+        "CLRT_CACHE_DIR": str(tmp_path / "cache"),
+        "POCL_CACHE_DIR": str(tmp_path / "kept"),
+        "OCL_ICD_VENDORS": str(POCL),
+    }
     for picture in ("cold.exr", "warm.exr"):
-        subprocess.run([sys.executable, "-m", "clrt", "render", str(MODEL), "-q", "--size", "32x18", "--spp", "2", "-o",
-                        picture], cwd=tmp_path, env=places, check=True, capture_output=True, timeout=200)
+        subprocess.run(
+            [sys.executable, "-m", "clrt", "render", str(MODEL), "-q", "--size", "32x18", "--spp", "2", "-o", picture],
+            cwd=tmp_path,
+            env=places,
+            check=True,
+            capture_output=True,
+            timeout=200,
+        )
         assert len(list((tmp_path / "kept").rglob("program.bc"))) == 2
     assert np.array_equal(read_image(tmp_path / "cold.exr"), read_image(tmp_path / "warm.exr"))
 
@@ -56,8 +67,9 @@ def test_what_is_refused_is_refused_as_without(device: Device) -> None:
     compiled = compile_scene(scene, Choices(device.lanes, builder="ploc"), device=device, ahead=True)
     assert compiled.tree.name == device.layout
     with pytest.raises(UsageError, match="the builder ploc builds"):
-        compile_scene(clrt.Scene(meshes=[one]), Choices(device.lanes, layout="list", builder="ploc"), device=device,
-                      ahead=True)
+        compile_scene(
+            clrt.Scene(meshes=[one]), Choices(device.lanes, layout="list", builder="ploc"), device=device, ahead=True
+        )
 
 
 def test_without_a_temporary_folder_it_is_compiled_here(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:

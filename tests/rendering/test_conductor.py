@@ -22,7 +22,7 @@ def fresnel(cos_o: Doubles, n: complex) -> Doubles:
     cos_t = np.sqrt(1 - (1 - cos_o**2) / n**2)
     r_s = (cos_o - n * cos_t) / (cos_o + n * cos_t)
     r_p = (n * cos_o - cos_t) / (n * cos_o + cos_t)
-    return np.asarray((abs(r_s)**2 + abs(r_p)**2) / 2)
+    return np.asarray((abs(r_s) ** 2 + abs(r_p) ** 2) / 2)
 
 
 EXTREMES = [((0.01, 1.0, 100.0), (5.0, 0.0, 100.0)), ((1.5, 0.01, 0.05), (0.0, 0.01, 20.0))]
@@ -35,8 +35,8 @@ def test_it_is_fresnels_with_a_complex_index(device: Device, eta: tuple[float, .
     metal = bsdfs(device, [Conductor(eta=(eta[0], eta[1], eta[2]), k=(k[0], k[1], k[2]), roughness=0.6)])
     wo, wi = above(5000, 5), above(5000, 6)
     h = (wo + wi) / np.linalg.norm(wo + wi, axis=1, keepdims=True)
-    tan2 = (1 - h[:, 2]**2) / h[:, 2]**2
-    d = alpha**2 / (np.pi * h[:, 2]**4 * (alpha**2 + tan2)**2)
+    tan2 = (1 - h[:, 2] ** 2) / h[:, 2] ** 2
+    d = alpha**2 / (np.pi * h[:, 2] ** 4 * (alpha**2 + tan2) ** 2)
     f = np.column_stack([fresnel(np.sum(wo * h, axis=1), complex(*index)) for index in zip(eta, k)])
     expected = f * (d * masking("height_correlated", alpha, wo[:, 2], wi[:, 2]) / (4 * wo[:, 2]))[:, None]
     off = np.abs(metal.value(0, wo, wi)[0] - expected)

@@ -25,7 +25,7 @@ def fresnel(cos_o: Doubles, eta: float) -> Doubles:
     cos_t = np.sqrt(1 - (1 - cos_o**2) / eta**2 + 0j)
     r_s = (cos_o - eta * cos_t) / (cos_o + eta * cos_t)
     r_p = (eta * cos_o - cos_t) / (eta * cos_o + cos_t)
-    return np.asarray((abs(r_s)**2 + abs(r_p)**2) / 2)
+    return np.asarray((abs(r_s) ** 2 + abs(r_p) ** 2) / 2)
 
 
 @pytest.mark.parametrize("front", [True, False])
@@ -71,8 +71,15 @@ def test_a_white_furnace_does_not_see_glass(device: Device) -> None:
 
     def mean(color: float, fov: float) -> Doubles:
         ball = Sphere(material=Dielectric(color=(color,) * 3))
-        return film(device, Scene(spheres=[ball], camera=replace(camera, fov_degrees=fov), environment=SKY,
-                                  render=RenderSettings(size=(32, 32), spp=64, max_depth=64))).mean
+        return film(
+            device,
+            Scene(
+                spheres=[ball],
+                camera=replace(camera, fov_degrees=fov),
+                environment=SKY,
+                render=RenderSettings(size=(32, 32), spp=64, max_depth=64),
+            ),
+        ).mean
 
     assert np.allclose(mean(1.0, 26), 1, atol=1e-6)
     noise = np.sqrt(0.25 / 32 / 32 / 64)
@@ -82,9 +89,12 @@ def test_a_white_furnace_does_not_see_glass(device: Device) -> None:
 def test_lamps_in_glass_are_seen_with_its_radiance(device: Device) -> None:
     """Radiance over eta² is constant along rays: outside, an emitter in glass has (1 − F)/eta² of its radiance."""
     glass = quad([(-9, -9, -1), (9, -9, -1), (9, 9, -1), (-9, 9, -1)], Dielectric(ior=1.5))
-    lamp = quad([(-99, -99, -2), (99, -99, -2), (99, 99, -2), (-99, 99, -2)],
-                Diffuse(color=(0.0, 0.0, 0.0), emission=(9.0, 9.0, 9.0)))
+    lamp = quad(
+        [(-99, -99, -2), (99, -99, -2), (99, 99, -2), (-99, 99, -2)],
+        Diffuse(color=(0.0, 0.0, 0.0), emission=(9.0, 9.0, 9.0)),
+    )
     camera = Camera(position=(0.0, 0.0, 0.0), look_at=(0.0, 0.0, -1.0), fov_degrees=1)
-    picture = film(device, Scene(meshes=[glass, lamp], camera=camera,
-                                 render=RenderSettings(size=(32, 32), spp=256, max_depth=4)))
+    picture = film(
+        device, Scene(meshes=[glass, lamp], camera=camera, render=RenderSettings(size=(32, 32), spp=256, max_depth=4))
+    )
     assert picture.mean.mean() == pytest.approx(9 * 0.96 / 2.25, rel=4 * np.sqrt(0.04 / 0.96 / 32 / 32 / 256))

@@ -66,8 +66,11 @@ def test_many_double_sided_lights_are_twice_as_many_one_sided_ones(device: Devic
 def test_a_lamp_seen_from_behind(device: Device, integrator: Integrator, double_sided: bool) -> None:
     """A camera sees the back of an emitter: its radiance exactly if double-sided, otherwise nothing."""
     lamp = replace(rectangle(-1, 1, -1, 1, 0.0), material=replace(LAMP, color=BLACK, double_sided=double_sided))
-    scene = Scene(meshes=[lamp], camera=Camera(position=(0, 5, 0), look_at=(0, 0, 0), up=(0, 0, 1), fov_degrees=5),
-                  render=RenderSettings(size=(8, 8), spp=2, integrator=integrator))
+    scene = Scene(
+        meshes=[lamp],
+        camera=Camera(position=(0, 5, 0), look_at=(0, 0, 0), up=(0, 0, 1), fov_degrees=5),
+        render=RenderSettings(size=(8, 8), spp=2, integrator=integrator),
+    )
     np.testing.assert_array_equal(film(device, scene).mean, np.broadcast_to(RADIANCE * double_sided, (8, 8, 3)))
 
 
@@ -76,24 +79,35 @@ def test_a_furnace_of_the_inner_side(device: Device, as_mesh: bool) -> None:
     """A convex body reflects its albedo times the uniform radiance of its surroundings."""
     shell = Diffuse(color=BLACK, emission=(0.5, 1.0, 2.0), double_sided=True)
     vertices, faces = rays.icosphere(1)
-    scene = Scene(meshes=[Mesh(3 * vertices, faces, shell)] if as_mesh else [],
-                  spheres=[Sphere(radius=0.5, material=Diffuse(color=(0.8, 0.4, 0.2)))]
-                  + ([] if as_mesh else [Sphere(radius=3.0, material=shell)]),
-                  camera=Camera(position=(0, 0, 2), fov_degrees=10),
-                  render=RenderSettings(size=(8, 8), spp=256, max_depth=2))
+    scene = Scene(
+        meshes=[Mesh(3 * vertices, faces, shell)] if as_mesh else [],
+        spheres=[Sphere(radius=0.5, material=Diffuse(color=(0.8, 0.4, 0.2)))]
+        + ([] if as_mesh else [Sphere(radius=3.0, material=shell)]),
+        camera=Camera(position=(0, 0, 2), fov_degrees=10),
+        render=RenderSettings(size=(8, 8), spp=256, max_depth=2),
+    )
     found = film(device, scene)
     samples, mean = found.samples, found.mean.mean(axis=(0, 1))
-    variance = found.variance.mean(axis=(0, 1)) * 256 + samples * (1e-6 * 0.4)**2    # including rounding
+    variance = found.variance.mean(axis=(0, 1)) * 256 + samples * (1e-6 * 0.4) ** 2  # including rounding
     assert mean_test(mean, variance, samples, 0.4).min() > sidak(FAMILY, 3), mean
 
 
 def test_an_inner_side_seen_through_a_transparent_near_side_lights_all_the_same(device: Device) -> None:
     """For a sphere of opacity a a ray sees L·a on the near side, and (1 − a)·L·a on the far side's inside."""
+
     def lit(opacity: float) -> Film:
-        ball = Sphere(center=(0, 1.5, 0), material=Diffuse(color=BLACK, emission=(1, 1, 1), opacity=opacity,
-                                                           double_sided=True))
-        return film(device, Scene(meshes=[ground], spheres=[ball], render=render,
-                                  camera=Camera(position=(0, 0.3, 3), look_at=(0, 0, 1.5), fov_degrees=5)))
+        ball = Sphere(
+            center=(0, 1.5, 0), material=Diffuse(color=BLACK, emission=(1, 1, 1), opacity=opacity, double_sided=True)
+        )
+        return film(
+            device,
+            Scene(
+                meshes=[ground],
+                spheres=[ball],
+                render=render,
+                camera=Camera(position=(0, 0.3, 3), look_at=(0, 0, 1.5), fov_degrees=5),
+            ),
+        )
 
     ground = quad([(-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)], Diffuse())
     render = RenderSettings(size=(8, 8), spp=1024, max_depth=2)

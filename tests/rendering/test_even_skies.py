@@ -34,18 +34,33 @@ def day(sun: float) -> Environment:
 
 
 @pytest.mark.parametrize("strength", [1e-30, 1.0, 1e30])
-@pytest.mark.parametrize("environment", [
-    day(20), day(5), sky(lambda w: 1 + 4 * np.maximum(w @ GLOW, 0)**8),
-    sky(lambda w: 1 + 4 * np.maximum(w @ GLOW, 0)**40), sky(lambda w: np.where(w @ GLOW > 0.3, 1.0, 0.01))],
-    ids=["small sun", "dim sun", "glow", "narrow glow", "third"])
+@pytest.mark.parametrize(
+    "environment",
+    [
+        day(20),
+        day(5),
+        sky(lambda w: 1 + 4 * np.maximum(w @ GLOW, 0) ** 8),
+        sky(lambda w: 1 + 4 * np.maximum(w @ GLOW, 0) ** 40),
+        sky(lambda w: np.where(w @ GLOW > 0.3, 1.0, 0.01)),
+    ],
+    ids=["small sun", "dim sun", "glow", "narrow glow", "third"],
+)
 def test_sampled(environment: Environment, strength: float) -> None:
     assert pack_sky(Environment(image=environment.image, strength=strength)).irradiance is not None
 
 
 @pytest.mark.parametrize("strength", [1e-30, 1.0, 1e30])
-@pytest.mark.parametrize("environment", [
-    default_sky(), default_sky(512), sky(lambda w: 1 + 0.9 * w[:, 1]), sky(lambda w: np.where(w[:, 1] > 0, 1.0, 0.01)),
-    sky(lambda w: 1 + np.maximum(w @ GLOW, 0)**40), day(0.5)],
-    ids=["default", "finer default", "gradient", "half", "weak glow", "no sun"])
+@pytest.mark.parametrize(
+    "environment",
+    [
+        default_sky(),
+        default_sky(512),
+        sky(lambda w: 1 + 0.9 * w[:, 1]),
+        sky(lambda w: np.where(w[:, 1] > 0, 1.0, 0.01)),
+        sky(lambda w: 1 + np.maximum(w @ GLOW, 0) ** 40),
+        day(0.5),
+    ],
+    ids=["default", "finer default", "gradient", "half", "weak glow", "no sun"],
+)
 def test_left_to_the_surfaces_own_directions(environment: Environment, strength: float) -> None:
     assert pack_sky(Environment(image=environment.image, strength=strength)).irradiance is None

@@ -28,7 +28,7 @@ def picture(seed: int) -> tuple[Doubles, Doubles]:
 
 def one_by_one(mean: Doubles, variance: Doubles, y: int, x: int, c: int) -> float:
     def others(values: Doubles, reach: int) -> float:
-        window = values[y - reach:y + reach + 1, x - reach:x + reach + 1, c].copy()
+        window = values[y - reach : y + reach + 1, x - reach : x + reach + 1, c].copy()
         window[reach, reach] = 0
         return float(window.sum() / (window.size - 1))
 
@@ -66,15 +66,15 @@ def test_a_pixel_bright_by_chance_is_not() -> None:
 def test_without_any_variance_known_it_is_what_lies_around() -> None:
     mean = picture(1)[0]
     found = expected(mean, np.full_like(mean, np.nan))
-    window = mean[:2 * REACH + 1, :2 * REACH + 1]
+    window = mean[: 2 * REACH + 1, : 2 * REACH + 1]
     np.testing.assert_allclose(found[0, 0], (window.sum(axis=(0, 1)) - mean[REACH, REACH]) / 288, rtol=PRECISION)
 
 
 @pytest.mark.parametrize("samples", [2, 4, 64])
 @pytest.mark.parametrize("bright", [1e4, 1e7, 1e9, 1e12, 1e15, 1e3 * SINGLE_MOST])
 def test_single_precision_is_enough_around_a_pixel(bright: float, samples: int) -> None:
-    """An outlier from one bright sample, and its neighbours: its light is in no sum from which it is subtracted again.
-    """
+    """An outlier from one bright sample, and its neighbours: its light is in no sum from which it is subtracted
+    again."""
     mean, variance = picture(0)
     drawn = np.full(samples, 5.0)
     drawn[0] = bright

@@ -17,8 +17,10 @@ from ..covering import others
 from .pictures import box, film, quad
 
 #: Text of film/film.cl and replacements that make sums stall: no compensation, and one that drops the previous error.
-STALLING = {"plain": ("    *sum = s + e;\n    *error = e - (*sum - s);", "    *sum = s;\n    *error = 0.0f;"),
-            "forgetful": ("real e = *error + (", "real e = (")}
+STALLING = {
+    "plain": ("    *sum = s + e;\n    *error = e - (*sum - s);", "    *sum = s;\n    *error = 0.0f;"),
+    "forgetful": ("real e = *error + (", "real e = ("),
+}
 
 
 @pytest.fixture(scope="module")
@@ -83,8 +85,11 @@ def test_noise_of_radiance_whose_squares_are_no_floats(probe: Probe, radiance: f
 def test_overflowing_light_is_dropped_and_counted(device: Device) -> None:
     """Walls of the largest radiance light each other: some sums overflow, and the image stays finite."""
     lamp = Diffuse(color=(1.0, 1.0, 1.0), emission=(3e38, 3e38, 3e38))
-    scene = Scene(meshes=[box(1.0, lamp)], camera=Camera(position=(0.0, 0.0, 0.0), look_at=(0.0, 0.1, 1.0)),
-                  render=RenderSettings(size=(8, 8), spp=16, max_depth=3))
+    scene = Scene(
+        meshes=[box(1.0, lamp)],
+        camera=Camera(position=(0.0, 0.0, 0.0), look_at=(0.0, 0.1, 1.0)),
+        render=RenderSettings(size=(8, 8), spp=16, max_depth=3),
+    )
     picture = film(device, scene)
     assert picture.nonfinite_samples > 0
     assert picture.samples == 8 * 8 * 16
@@ -101,13 +106,16 @@ def test_noise_is_the_error(device: Device, spp: int) -> None:
     """
     albedo, emission = 0.5, 2.0
     walls = box(1.0, Diffuse(color=(albedo,) * 3, emission=(emission,) * 3))
-    scene = Scene(meshes=[walls], camera=Camera(position=(0.1, 0.2, 0.3), look_at=(1.0, 0.5, 0.2), fov_degrees=90),
-                  render=RenderSettings(size=(64, 64), spp=spp, max_depth=5, seed=3))
+    scene = Scene(
+        meshes=[walls],
+        camera=Camera(position=(0.1, 0.2, 0.3), look_at=(1.0, 0.5, 0.2), fov_degrees=90),
+        render=RenderSettings(size=(64, 64), spp=spp, max_depth=5, seed=3),
+    )
     picture, truth = film(device, scene), emission * (1 - albedo**5) / (1 - albedo)
     error = picture.mean[..., 0] - truth
     true_square = np.mean(error**2) / (truth**2 + RELATIVE_FLOOR)
     assert picture.noise is not None
-    kurtosis = np.mean(error**4) / np.mean(error**2)**2 - 3
+    kurtosis = np.mean(error**4) / np.mean(error**2) ** 2 - 3
     spread = np.sqrt((2 + np.maximum(kurtosis, 0)) / error.size)
     assert abs(picture.noise**2 / true_square - 1) < 4 * np.sqrt(2) * spread
 
@@ -118,11 +126,15 @@ def test_noise_falls_with_the_root_of_the_samples(device: Device) -> None:
     camera = Camera(position=(0.0, 3.0, 8.0), look_at=(0.0, 0.0, 0.0), fov_degrees=30)
     noises = []
     for spp in (16, 256):
-        scene = Scene(meshes=[lamp, floor], spheres=[Sphere(radius=0.3)], camera=camera,
-                      environment=Environment(color=(0.1, 0.1, 0.1)),
-                      render=RenderSettings(size=(48, 48), spp=spp, max_depth=3))
+        scene = Scene(
+            meshes=[lamp, floor],
+            spheres=[Sphere(radius=0.3)],
+            camera=camera,
+            environment=Environment(color=(0.1, 0.1, 0.1)),
+            render=RenderSettings(size=(48, 48), spp=spp, max_depth=3),
+        )
         noises.append(film(device, scene).noise)
-    assert noises[0] and noises[1] and 3.2 < noises[0] / noises[1] < 4.8   # 4, within a fifth
+    assert noises[0] and noises[1] and 3.2 < noises[0] / noises[1] < 4.8  # 4, within a fifth
 
 
 def test_counts_and_rays(device: Device) -> None:

@@ -16,13 +16,17 @@ from clrt.scene.render_settings import Filter
 
 from .pictures import film, pixel_p_values, quad
 
-DENSITIES = {"box": lambda t: float(abs(t) < 0.5), "tent": lambda t: max(0.0, 1 - abs(t)),
-             "blackman_harris": lambda t: float(np.interp(t, np.linspace(-1.5, 1.5, 4097), blackmanharris(4097), 0, 0)),
-             "gaussian": lambda t: max(0.0, float(np.exp(-2 * t * t) - np.exp(-8)))}
+DENSITIES = {
+    "box": lambda t: float(abs(t) < 0.5),
+    "tent": lambda t: max(0.0, 1 - abs(t)),
+    "blackman_harris": lambda t: float(np.interp(t, np.linspace(-1.5, 1.5, 4097), blackmanharris(4097), 0, 0)),
+    "gaussian": lambda t: max(0.0, float(np.exp(-2 * t * t) - np.exp(-8))),
+}
 
 
 def coverage(name: str, places: np.ndarray) -> np.ndarray:
     """Return the share of a filter centred at 0 that lies left of each place, in pixels."""
+
     def part(end: float) -> float:
         kinks = [p for p in (-1, -0.5, 0, 0.5, 1) if p < end]
         return float(integral(DENSITIES[name], -2, end, points=kinks, limit=200)[0])
@@ -44,8 +48,12 @@ def test_an_edge_is_blurred_by_the_filter(device: Device, name: Filter) -> None:
     right, lamp = 2 * edge / size - 1, Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0))
     wall = quad([(-9, -9, -1), (right, -9, -1), (right, 9, -1), (-9, 9, -1)], lamp)
     camera = Camera(position=(0.0, 0.0, 0.0), look_at=(0.0, 0.0, -1.0), fov_degrees=90)
-    picture = film(device, Scene(meshes=[wall], camera=camera,
-                                 render=RenderSettings(size=(size, size), spp=4096, max_depth=1, filter=name)))
+    picture = film(
+        device,
+        Scene(
+            meshes=[wall], camera=camera, render=RenderSettings(size=(size, size), spp=4096, max_depth=1, filter=name)
+        ),
+    )
     truth = np.broadcast_to(coverage(name, edge - (np.arange(size) + 0.5))[None, :, None], (size, size, 3))
     seen = (truth > 1e-3) & (truth < 1 - 1e-3)
     assert not rejected({str(i): p for i, p in enumerate(pixel_p_values(picture, truth)[seen][::3])})

@@ -32,8 +32,11 @@ SIZE = (20, 14)
 def ball(integrator: Integrator, camera: Camera, spp: int = 4, unit: float = 1.0) -> Scene:
     """Return a scene with a sphere of radius 1.3 at BALL."""
     center = tuple((unit * np.array(BALL)).tolist())
-    return Scene(spheres=[Sphere(center=center, radius=1.3 * unit, material=RED)], camera=camera,
-                 render=RenderSettings(size=SIZE, spp=spp, integrator=integrator))
+    return Scene(
+        spheres=[Sphere(center=center, radius=1.3 * unit, material=RED)],
+        camera=camera,
+        render=RenderSettings(size=SIZE, spp=spp, integrator=integrator),
+    )
 
 
 def met(origin: Doubles, w: Doubles) -> Doubles:
@@ -56,9 +59,14 @@ def test_depth_of_a_ball(device: Device, name: str, unit: float) -> None:
     start = near - w if camera.projection == "equirectangular" else near - w / (w @ frame(camera)[0])[:, None]
     expected = met(start, w) * (1.0 if camera.projection == "equirectangular" else w @ frame(camera)[0])
     position, look_at = (tuple((unit * np.array(place)).tolist()) for place in (camera.position, camera.look_at))
-    camera = replace(camera, position=position, look_at=look_at, aperture_radius=camera.aperture_radius * unit,
-                     focus_distance=camera.focus_distance and camera.focus_distance * unit,
-                     view_height=camera.view_height and camera.view_height * unit)
+    camera = replace(
+        camera,
+        position=position,
+        look_at=look_at,
+        aperture_radius=camera.aperture_radius * unit,
+        focus_distance=camera.focus_distance and camera.focus_distance * unit,
+        view_height=camera.view_height and camera.view_height * unit,
+    )
     found = film(device, ball("depth", camera, unit=unit)).mean / unit
     assert 5 <= np.isfinite(expected).sum() < len(expected)
     np.testing.assert_allclose(found, np.nan_to_num(expected).reshape(*SIZE[::-1], 1) * np.ones(3), rtol=2e-6)
@@ -81,8 +89,10 @@ def test_albedo_is_the_materials_own(device: Device) -> None:
     camera = Camera(position=(0.0, 0.0, 3.0), fov_degrees=20)
     materials = {RED: (0.7, 0.2, 0.1), Mirror(color=(0.5, 0.6, 0.7)): (0.5, 0.6, 0.7)}
     for (material, color), other in zip(materials.items(), reversed(materials)):
-        walls = [quad([(-9, -9, z), (-9, 9, z), (9, 9, z), (9, -9, z)], each)   # seen from behind
-                 for z, each in ((0, material), (-1, other))]
+        walls = [
+            quad([(-9, -9, z), (-9, 9, z), (9, 9, z), (9, -9, z)], each)  # seen from behind
+            for z, each in ((0, material), (-1, other))
+        ]
         for integrator, expected in (("albedo", color), ("normals", (0.0, 0.0, 1.0)), ("depth", (3.0, 3.0, 3.0))):
             settings = RenderSettings(size=(5, 3), spp=2, integrator=integrator)  # type: ignore[arg-type]
             picture = film(device, Scene(meshes=walls, camera=camera, render=settings)).mean
@@ -91,8 +101,10 @@ def test_albedo_is_the_materials_own(device: Device) -> None:
 
 def test_what_is_clear_is_not_seen(device: Device) -> None:
     """A one-sided wall from behind and one of opacity 0 are not seen in front of another wall."""
-    walls = [quad([(-9, -9, z), (9, -9, z), (9, 9, z), (-9, 9, z)], replace(RED, **clear))
-             for z, clear in ((-1.0, {}), (0.0, {"opacity": 0.0}), (1.0, {"one_sided": True}))]
+    walls = [
+        quad([(-9, -9, z), (9, -9, z), (9, 9, z), (-9, 9, z)], replace(RED, **clear))
+        for z, clear in ((-1.0, {}), (0.0, {"opacity": 0.0}), (1.0, {"one_sided": True}))
+    ]
     walls[2] = replace(walls[2], faces=np.ascontiguousarray(walls[2].faces[:, ::-1]))
     for integrator, expected in (("normals", (0.0, 0.0, 1.0)), ("depth", (4.0, 4.0, 4.0))):
         settings = RenderSettings(size=(5, 3), spp=2, integrator=integrator)  # type: ignore[arg-type]
@@ -115,8 +127,9 @@ def test_pictures_are_what_guides_are(device: Device) -> None:
 
 
 @pytest.mark.parametrize("integrator", ["albedo", *others("normals", "depth")])
-def test_no_light_is_compiled_or_missed(device: Device, integrator: Integrator,
-                                        caplog: pytest.LogCaptureFixture) -> None:
+def test_no_light_is_compiled_or_missed(
+    device: Device, integrator: Integrator, caplog: pytest.LogCaptureFixture
+) -> None:
     """No warning about darkness, no light code, no black pixels; SIMD widths agree."""
     scene = replace(everything(), render=replace(everything().render, integrator=integrator))
     compiled = session(device, scene).compiled

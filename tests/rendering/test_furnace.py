@@ -32,8 +32,8 @@ WHITE = (1.0, 1.0, 1.0)
 
 @pytest.fixture(scope="module")
 def metals(device: Device) -> list[Reflected]:
-    """Return measurements at every roughness and angle, for each shadowing form, without and with multiple scattering.
-    """
+    """Return measurements at every roughness and angle, for each shadowing form, without and with multiple
+    scattering."""
     return list(measure_metals(device, SAMPLES))
 
 
@@ -62,7 +62,7 @@ def test_what_is_added_is_kulla_and_contys_lobe(device: Device) -> None:
     nodes, weights = np.polynomial.legendre.leggauss(12)
     mu = (nodes + 1) / 2
     average = weights @ [mu_i * ggx.albedo(alpha, mu_i, "height_correlated") for mu_i in mu]
-    fresnel = weights @ (mu[:, None] * (f0 + (1 - f0) * (1 - mu[:, None])**5))
+    fresnel = weights @ (mu[:, None] * (f0 + (1 - f0) * (1 - mu[:, None]) ** 5))
     color = fresnel**2 * average / (1 - fresnel * (1 - average))
     wo, wi = (np.array([[np.sqrt(1 - c * c), 0.0, c] for c in some]) for some in ([1.0, 0.5, 0.1], [0.2, 0.7, 0.4]))
     loss = [1 - np.array([ggx.albedo(alpha, w[2], "height_correlated", 1000) for w in some]) for some in (wo, wi)]
@@ -75,10 +75,20 @@ def test_what_is_added_is_kulla_and_contys_lobe(device: Device) -> None:
 def test_white_reflects_all(device: Device, smith: Smith) -> None:
     """For any metallic, index and specular: what the gloss does not reflect, the body does."""
     rng = np.random.default_rng(SMITHS.index(smith))
-    materials = [MetallicRoughness(color=WHITE, metallic=rng.choice([0, rng.random(), 1]), roughness=rng.random(),
-                                   ior=1 + 3 * rng.random()**2, specular=rng.choice([1, rng.random()]), smith=smith,
-                                   specular_color=tuple(rng.choice([1, rng.random()], 3)), coupling="albedo",
-                                   multiple_scattering=True) for _ in range(40)]
+    materials = [
+        MetallicRoughness(
+            color=WHITE,
+            metallic=rng.choice([0, rng.random(), 1]),
+            roughness=rng.random(),
+            ior=1 + 3 * rng.random() ** 2,
+            specular=rng.choice([1, rng.random()]),
+            smith=smith,
+            specular_color=tuple(rng.choice([1, rng.random()], 3)),
+            coupling="albedo",
+            multiple_scattering=True,
+        )
+        for _ in range(40)
+    ]
     whites, numbers = bsdfs(device, [*materials]), evenly(SAMPLES)
     for which, material in enumerate(materials):
         for cosine in (1.0, rng.random(), 0.1 * rng.random(), 0.01):
@@ -90,8 +100,12 @@ def test_white_reflects_all(device: Device, smith: Smith) -> None:
 @pytest.mark.parametrize("metallic", [0.0, 0.5, 0.9])
 def test_white_coupled_by_fresnel_makes_no_light(device: Device, metallic: float) -> None:
     """A white body below a gloss with multiple scattering, whose energy is reflected before light enters the body."""
-    materials = [MetallicRoughness(color=WHITE, metallic=metallic, roughness=roughness, coupling="fresnel",
-                                   multiple_scattering=True) for roughness in (0.0, 0.1, 0.3, 0.6, 1.0)]
+    materials = [
+        MetallicRoughness(
+            color=WHITE, metallic=metallic, roughness=roughness, coupling="fresnel", multiple_scattering=True
+        )
+        for roughness in (0.0, 0.1, 0.3, 0.6, 1.0)
+    ]
     whites, numbers = bsdfs(device, [*materials]), evenly(SAMPLES)
     for which, material in enumerate(materials):
         for cosine in (1.0, 0.5, 0.1, 0.01, 1e-3):
@@ -101,8 +115,10 @@ def test_white_coupled_by_fresnel_makes_no_light(device: Device, metallic: float
 
 def test_samples_weigh_little(device: Device) -> None:
     """The lobe's own sampling keeps weights bounded; cosine sampling gives weights of 1e5 at low roughness."""
-    metals = [MetallicRoughness(color=WHITE, metallic=1.0, roughness=roughness, multiple_scattering=True)
-              for roughness in (0.0, 0.05, 0.2, 0.5, 1.0)]
+    metals = [
+        MetallicRoughness(color=WHITE, metallic=1.0, roughness=roughness, multiple_scattering=True)
+        for roughness in (0.0, 0.05, 0.2, 0.5, 1.0)
+    ]
     whites, numbers = bsdfs(device, [*metals]), evenly(1 << 16)
     for which in range(len(metals)):
         for cosine in (1.0, 0.1, 1e-3):
@@ -112,10 +128,12 @@ def test_samples_weigh_little(device: Device) -> None:
 
 def random_glasses(rng: np.random.Generator, count: int) -> list[Dielectric]:
     """Return rough glasses of any index, a third of them close to 1; every fourth is a thin sheet."""
-    near = 1 + rng.choice([-1, 1], count) * 10**rng.uniform(-2.5, -1, count)
-    iors = np.where(rng.random(count) < 1 / 3, near, 4**rng.uniform(-1, 1, count))
-    return [Dielectric(ior=float(ior), roughness=float(roughness), thin=i % 4 == 3)
-            for i, (ior, roughness) in enumerate(zip(iors, rng.uniform(0.01, 1, count)))]
+    near = 1 + rng.choice([-1, 1], count) * 10 ** rng.uniform(-2.5, -1, count)
+    iors = np.where(rng.random(count) < 1 / 3, near, 4 ** rng.uniform(-1, 1, count))
+    return [
+        Dielectric(ior=float(ior), roughness=float(roughness), thin=i % 4 == 3)
+        for i, (ior, roughness) in enumerate(zip(iors, rng.uniform(0.01, 1, count)))
+    ]
 
 
 def test_rough_glass_keeps_all_light(device: Device) -> None:
@@ -153,8 +171,15 @@ def test_a_furnace_does_not_see_rough_glass(device: Device) -> None:
     for multiple in (True, False):
         ball = Sphere(material=Dielectric(roughness=0.8, multiple_scattering=multiple))
         camera = Camera(position=(0.0, 0.0, 9.0), fov_degrees=8.0)
-        mean = film(device, Scene(spheres=[ball], camera=camera, environment=Environment(color=WHITE),
-                                  render=RenderSettings(size=(32, 32), spp=256, max_depth=256))).mean.mean()
+        mean = film(
+            device,
+            Scene(
+                spheres=[ball],
+                camera=camera,
+                environment=Environment(color=WHITE),
+                render=RenderSettings(size=(32, 32), spp=256, max_depth=256),
+            ),
+        ).mean.mean()
         assert abs(mean - 1) < 3e-3 if multiple else mean < 0.8
 
 
@@ -175,10 +200,16 @@ def test_single_scattering_of_rough_glass_loses_light(device: Device) -> None:
 
 def test_only_those_who_ask_pay(device: Device) -> None:
     """Other scenes compile no code for it, and a material without it is unchanged in a scene that has it."""
-    plain, full = (MetallicRoughness(roughness=0.7, metallic=0.5, coupling="fresnel", multiple_scattering=multiple)
-                   for multiple in (False, True))
-    alone, both = (compile_scene(Scene(spheres=[Sphere(material=material) for material in materials]),
-                                 Choices(device.lanes, device.layout)) for materials in ([plain], [plain, full]))
+    plain, full = (
+        MetallicRoughness(roughness=0.7, metallic=0.5, coupling="fresnel", multiple_scattering=multiple)
+        for multiple in (False, True)
+    )
+    alone, both = (
+        compile_scene(
+            Scene(spheres=[Sphere(material=material) for material in materials]), Choices(device.lanes, device.layout)
+        )
+        for materials in ([plain], [plain, full])
+    )
     for feature in ("MULTIPLE_SCATTERING", "GGX_ALBEDO"):
         assert feature not in alone.features and feature in both.features
     wo, wi = above(4000, 1), above(4000, 2)
@@ -188,7 +219,9 @@ def test_only_those_who_ask_pay(device: Device) -> None:
 
 
 def test_scene_file(tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").write_text('[materials.iron]\ntype = "metallic_roughness"\npreset = "iron"\n'
-                                         'multiple_scattering = true\n[[sphere]]\nmaterial = "iron"\n')
+    (tmp_path / "scene.toml").write_text(
+        '[materials.iron]\ntype = "metallic_roughness"\npreset = "iron"\n'
+        'multiple_scattering = true\n[[sphere]]\nmaterial = "iron"\n'
+    )
     material = load(tmp_path / "scene.toml").spheres[0].material
     assert material == MetallicRoughness(preset="iron", multiple_scattering=True)

@@ -31,14 +31,17 @@ FURNACE: dict[Material, float] = {
     MetallicRoughness(color=RED, metallic=0.0, roughness=0.1): 5e-4,
     MetallicRoughness(color=RED, metallic=0.5, roughness=0.1): 5e-4,
     MetallicRoughness(preset="diamond", color=(1.0, 1.0, 1.0), roughness=0.1): 5e-4,
-    MetallicRoughness(metallic=1.0, color=(1.0, 1.0, 1.0), roughness=0.9, multiple_scattering=True): 4e-3}
+    MetallicRoughness(metallic=1.0, color=(1.0, 1.0, 1.0), roughness=0.9, multiple_scattering=True): 4e-3,
+}
 
 
 def with_specks(scene: Scene) -> Scene:
     """Return the scene with specks of all materials, and a smooth one, too small and far away to be seen,
     so that all scenes use one program."""
-    specks = [Sphere(center=(30.0, 30.0, 30.0 + i), radius=1e-3, material=material)
-              for i, material in enumerate([*FURNACE, Mirror(), Dielectric()])]
+    specks = [
+        Sphere(center=(30.0, 30.0, 30.0 + i), radius=1e-3, material=material)
+        for i, material in enumerate([*FURNACE, Mirror(), Dielectric()])
+    ]
     smooth = quad([(30, 30, 29), (30.001, 30, 29), (30.001, 30.001, 29), (30, 30.001, 29)], Diffuse())
     smooth.normals = np.tile(np.array([0.0, 0.0, 1.0], np.float32), (4, 1))
     return replace(scene, meshes=[*scene.meshes, smooth], spheres=[*scene.spheres, *specks])
@@ -67,8 +70,12 @@ def everywhere(picture: Floats, expected: tuple[float, ...]) -> None:
 @pytest.mark.parametrize("material, tolerance", FURNACE.items(), ids=range(len(FURNACE)))
 def test_albedo_is_what_a_furnace_shows(device: Device, material: Material, tolerance: float) -> None:
     """Seen head on under a white sky, an unoccluded surface is as bright as its albedo."""
-    scene = Scene(meshes=[back(material)], environment=Environment(color=(1.0, 1.0, 1.0)),
-                  camera=replace(INSIDE, fov_degrees=1e-2), render=RenderSettings(size=(16, 16), max_depth=2))
+    scene = Scene(
+        meshes=[back(material)],
+        environment=Environment(color=(1.0, 1.0, 1.0)),
+        camera=replace(INSIDE, fov_degrees=1e-2),
+        render=RenderSettings(size=(16, 16), max_depth=2),
+    )
     shown = film(device, with_specks(scene), 4096, sampler="sobol").mean.mean(axis=(0, 1))
     np.testing.assert_allclose(guides(device, scene)["albedo"].mean(axis=(0, 1)), shown, atol=tolerance)
 
@@ -76,8 +83,11 @@ def test_albedo_is_what_a_furnace_shows(device: Device, material: Material, tole
 def test_normals_of_a_sphere(device: Device) -> None:
     """In pixels that the sphere covers: the mean over the pixel, by quadrature in float64."""
     camera, size, center, radius = Camera(position=(3.0, 2.0, 4.0)), (20, 15), np.array([0.2, -0.1, 0.0]), 1.3
-    scene = Scene(spheres=[Sphere(center=tuple(center.tolist()), radius=radius, material=Diffuse(color=RED))],
-                  camera=camera, render=RenderSettings(size=size))
+    scene = Scene(
+        spheres=[Sphere(center=tuple(center.tolist()), radius=radius, material=Diffuse(color=RED))],
+        camera=camera,
+        render=RenderSettings(size=size),
+    )
     nodes, weights = np.polynomial.legendre.leggauss(6)
     place = (nodes + 1) / 2
     columns, rows = (np.add.outer(np.arange(n), place).ravel() for n in size)
@@ -118,8 +128,12 @@ def test_sky_is_its_radiance_up_to_one_without_a_normal(device: Device) -> None:
 def test_mirrors_are_followed(device: Device) -> None:
     """To the wall behind the camera, tinted, and to the sky; through two mirrors; and no deeper than `max_depth`."""
     tinted, behind = Mirror(color=(0.9, 0.8, 0.5)), front(Diffuse(color=RED))
-    wall = Scene(meshes=[back(tinted), behind], environment=Environment(color=(0.5, 1.0, 4.0)), camera=INSIDE,
-                 render=replace(FLAT, max_depth=4))
+    wall = Scene(
+        meshes=[back(tinted), behind],
+        environment=Environment(color=(0.5, 1.0, 4.0)),
+        camera=INSIDE,
+        render=replace(FLAT, max_depth=4),
+    )
     found = guides(device, wall)
     everywhere(found["albedo"], (0.63, 0.16, 0.05))
     everywhere(found["normal"], (0, 0, -1))
@@ -151,8 +165,12 @@ def test_glass_is_looked_through(device: Device) -> None:
 def test_glass_absorbs(device: Device) -> None:
     """What is seen through a pane 1 unit thick is tinted by its transmittance, also the sky."""
     glass = Dielectric(color=(0.9, 0.8, 0.5), attenuation_color=(0.49, 0.25, 0.04), attenuation_distance=2.0)
-    pane = Scene(meshes=[front(glass, -0.5), back(glass, 0.5), back(Diffuse(color=RED))], render=FLAT,
-                 environment=Environment(color=(0.5, 0.5, 0.5)), camera=replace(INSIDE, fov_degrees=1e-3))
+    pane = Scene(
+        meshes=[front(glass, -0.5), back(glass, 0.5), back(Diffuse(color=RED))],
+        render=FLAT,
+        environment=Environment(color=(0.5, 0.5, 0.5)),
+        camera=replace(INSIDE, fov_degrees=1e-3),
+    )
     tint = 0.9**2 * 0.7, 0.8**2 * 0.5, 0.5**2 * 0.2
     everywhere(guides(device, pane)["albedo"], (0.7 * tint[0], 0.2 * tint[1], 0.1 * tint[2]))
     sky = guides(device, replace(pane, meshes=pane.meshes[:2]))
@@ -178,8 +196,9 @@ def test_lanes_agree(device: Device) -> None:
 
 def test_launches_agree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """They are equal bit for bit however the work is split into launches."""
-    scene = Scene(meshes=[back(Mirror()), front(Diffuse(color=RED))], camera=INSIDE,
-                  render=RenderSettings(size=(60, 40)))
+    scene = Scene(
+        meshes=[back(Mirror()), front(Diffuse(color=RED))], camera=INSIDE, render=RenderSettings(size=(60, 40))
+    )
     whole = guides(device, scene)
     monkeypatch.setattr(per_pixel_kernel, "FIRST_LAUNCH_SAMPLES", 1)
     monkeypatch.setattr(per_pixel_kernel, "FEWEST_TILES", 2)

@@ -32,12 +32,25 @@ GLOSSY: list[Material] = [
     MetallicRoughness(color=COLOR, metallic=1.0, roughness=0.4),
     MetallicRoughness(color=COLOR, metallic=1.0, roughness=0.8, multiple_scattering=True),
     MetallicRoughness(color=COLOR, metallic=0.0, roughness=0.5, transmission=1.0),
-    MetallicRoughness(color=COLOR, metallic=1.0, roughness=0.7, clearcoat=0.5, clearcoat_roughness=0.4,
-                      sheen_color=(0.2, 0.3, 0.4), sheen_roughness=0.7),
-    Conductor(roughness=0.5), Dielectric(color=COLOR, roughness=0.5), Dielectric(roughness=0.5, ior=1 / 1.5),
-    Dielectric(color=COLOR, roughness=0.6, thin=True)]
-MATTE: list[Material] = [Diffuse(color=COLOR), Phong(color=(0.5, 0.4, 0.3), specular=(0.3, 0.4, 0.5), shininess=9.0),
-                         MetallicRoughness(color=COLOR, metallic=0.5, roughness=0.5)]
+    MetallicRoughness(
+        color=COLOR,
+        metallic=1.0,
+        roughness=0.7,
+        clearcoat=0.5,
+        clearcoat_roughness=0.4,
+        sheen_color=(0.2, 0.3, 0.4),
+        sheen_roughness=0.7,
+    ),
+    Conductor(roughness=0.5),
+    Dielectric(color=COLOR, roughness=0.5),
+    Dielectric(roughness=0.5, ior=1 / 1.5),
+    Dielectric(color=COLOR, roughness=0.6, thin=True),
+]
+MATTE: list[Material] = [
+    Diffuse(color=COLOR),
+    Phong(color=(0.5, 0.4, 0.3), specular=(0.3, 0.4, 0.5), shininess=9.0),
+    MetallicRoughness(color=COLOR, metallic=0.5, roughness=0.5),
+]
 SPECULAR: list[Material] = [Mirror(color=COLOR), Dielectric(color=COLOR)]
 #: Cells of the sphere by z and azimuth, and points per cell in each dimension.
 CELLS, POINTS = 12, 60
@@ -68,8 +81,9 @@ class Tilted:
 def tilted(device: Device) -> Tilted:
     every = [*GLOSSY, *MATTE, *SPECULAR]
     up = np.tile(np.array([0, 0, 1], np.float32), (4, 1))
-    sheets = [replace(quad([(0, 0, i), (1, 0, i), (1, 1, i), (0, 1, i)], each), normals=up)
-              for i, each in enumerate(every)]
+    sheets = [
+        replace(quad([(0, 0, i), (1, 0, i), (1, 1, i), (0, 1, i)], each), normals=up) for i, each in enumerate(every)
+    ]
     probe = Probe(device, Scene(meshes=sheets))
     return Tilted(every, probe, probe.compiled.buffers["triangles"][1]["material"][::2].astype(np.float64))
 
@@ -118,8 +132,10 @@ def test_gloss_is_mirrored_at_the_surface(tilted: Tilted, which: int) -> None:
         wi = unit(np.random.default_rng(seed).normal(size=(4000, 3))).astype(np.float32).astype(np.float64)
         other, (ng, ns, wo) = mirrored(frame, wi), unit(frame)
         code = np.full(len(wi), tilted.codes[which])
-        plain = [tilted.probe("bsdf_value", 4, code, np.broadcast_to(local(frame, wo), wi.shape), local(frame, w),
-                              front=1) for w in (wi, other)]
+        plain = [
+            tilted.probe("bsdf_value", 4, code, np.broadcast_to(local(frame, wo), wi.shape), local(frame, w), front=1)
+            for w in (wi, other)
+        ]
         ours, folded = ((w @ ns > 0) == (wi @ ng > 0) for w in (wi, other))
         value = np.where(ours[:, None], plain[0][:, :3], 0)
         value += np.where(folded[:, None], plain[1][:, :3] - matte(material, other @ ns), 0)
@@ -150,7 +166,7 @@ def test_samples_follow_the_density(tilted: Tilted) -> None:
             shares = np.array([*expected, max(1 - expected.sum(), 0)])
             chi2[f"{i} {tilted.materials[which]}"] = chi2_test([*found, count - kept.sum()], count * shares + 1e-9)
             value, again = tilted.value(which, frame, wi)
-            sure = np.abs(again / sample[kept, 6] - 1) < 1e-3     # A few lie on a horizon
+            sure = np.abs(again / sample[kept, 6] - 1) < 1e-3  # A few lie on a horizon
             assert sure.mean() > 0.998
             carried = sample[kept, 3:6] * sample[kept, 6:7] * np.where(wi @ frame[0] < 0, sample[kept, 8], 1)[:, None]
             np.testing.assert_allclose(carried[sure], value[sure], rtol=2e-3, atol=1e-5)
@@ -165,8 +181,9 @@ def test_no_energy_of_gloss_is_lost(tilted: Tilted, which: int) -> None:
     for i, frame in enumerate(frames(8, 200 + which)):
         folded = tilted.sample(which, frame, numbers)
         wo = local(frame, unit(frame[2]))
-        plain = tilted.probe("bsdf_sample", 9, np.full(count, tilted.codes[which]), np.broadcast_to(wo, (count, 3)),
-                             numbers, front=1)
+        plain = tilted.probe(
+            "bsdf_sample", 9, np.full(count, tilted.codes[which]), np.broadcast_to(wo, (count, 3)), numbers, front=1
+        )
         left, right = (each[:, 3:6] * (each[:, 6:7] > 0) for each in (folded, plain))
         difference = (left - right) / right.mean(axis=0)
         assert (np.abs(difference.mean(axis=0)) < 0.05).all()
@@ -187,8 +204,14 @@ def test_mirrored_views_stay_above(tilted: Tilted, which: int) -> None:
         view = 2 * (wo @ ns) * ns - wo
         view -= 2 * min(view @ ng, 0) * ng
         np.testing.assert_allclose(sample[up, :3], np.broadcast_to(view, (up.sum(), 3)), atol=2e-6)
-        plain = tilted.probe("bsdf_sample", 9, np.full(len(numbers), tilted.codes[which]),
-                             np.broadcast_to(local(frame, wo), (len(numbers), 3)), numbers, front=1)
+        plain = tilted.probe(
+            "bsdf_sample",
+            9,
+            np.full(len(numbers), tilted.codes[which]),
+            np.broadcast_to(local(frame, wo), (len(numbers), 3)),
+            numbers,
+            front=1,
+        )
         same = (plain[:, 2] > 0) == up
         assert same.mean() > 0.98
         np.testing.assert_allclose(sample[same, 3:6], plain[same, 3:6], rtol=1e-4)
@@ -213,8 +236,12 @@ def furnace(material: Material, seed: int) -> Scene:
         normals = unit(vertices + 0.5 * np.random.default_rng(seed).normal(size=vertices.shape))
         mesh = Mesh(vertices, faces, material, normals=normals.astype(np.float32))
     camera = Camera(position=(0, -2, 2.5), look_at=(0, 0, 0), up=(0, 0, 1), fov_degrees=50)
-    return Scene(meshes=[mesh], environment=Environment(color=WHITE), camera=camera,
-                 render=RenderSettings(size=(32, 32), spp=64, max_depth=3))
+    return Scene(
+        meshes=[mesh],
+        environment=Environment(color=WHITE),
+        camera=camera,
+        render=RenderSettings(size=(32, 32), spp=64, max_depth=3),
+    )
 
 
 @pytest.mark.parametrize("mapped", [False, True])
@@ -225,20 +252,27 @@ def test_white_gloss_in_a_white_furnace_is_white(device: Device, mapped: bool, s
     normal_map = bumps(seed) if mapped else None
     assert np.abs(film(device, furnace(Mirror(color=WHITE, normal_map=normal_map), seed)).mean - 1).max() < 1e-5
     for roughness in (0.2, 0.6, 1.0):
-        metal = MetallicRoughness(color=WHITE, metallic=1.0, roughness=roughness, multiple_scattering=True,
-                                  normal_map=normal_map)
+        metal = MetallicRoughness(
+            color=WHITE, metallic=1.0, roughness=roughness, multiple_scattering=True, normal_map=normal_map
+        )
         found = film(device, furnace(metal, seed))
         count = found.pixels["count"].astype(np.float64)
         squares = (found.pixels["square"].astype(np.float64) + found.pixels["square_error"])[..., 0] / count
-        error = np.sqrt(np.sum((squares - found.mean[..., 0]**2) / count)) / count.size
+        error = np.sqrt(np.sum((squares - found.mean[..., 0] ** 2) / count)) / count.size
         assert error < 2e-3
         assert found.mean.mean() == pytest.approx(1, abs=5 * error + FITTED)
 
 
-@pytest.mark.parametrize("material", [MetallicRoughness(color=COLOR, metallic=1.0, roughness=0.5),
-                                      MetallicRoughness(color=COLOR, roughness=0.4), Diffuse(color=COLOR),
-                                      Phong(color=COLOR, specular=(0.1, 0.2, 0.3), shininess=20.0)],
-                         ids=["metal", "plastic", "diffuse", "phong"])
+@pytest.mark.parametrize(
+    "material",
+    [
+        MetallicRoughness(color=COLOR, metallic=1.0, roughness=0.5),
+        MetallicRoughness(color=COLOR, roughness=0.4),
+        Diffuse(color=COLOR),
+        Phong(color=COLOR, specular=(0.1, 0.2, 0.3), shininess=20.0),
+    ],
+    ids=["metal", "plastic", "diffuse", "phong"],
+)
 def test_light_samples_and_bsdf_samples_agree(device: Device, material: Material) -> None:
     """For an emitter at the horizon of a bumpy sheet: light samples alone and MIS agree in each integrator."""
     sheet = furnace(replace(material, normal_map=bumps(5)), 5).meshes[0]
@@ -246,7 +280,7 @@ def test_light_samples_and_bsdf_samples_agree(device: Device, material: Material
     scene = Scene(meshes=[sheet], spheres=[lamp], camera=Camera(position=(0, -2, 2.5), up=(0, 0, 1), fov_degrees=40))
     means = {}
     integrators: tuple[Integrator, ...] = ("path", "direct", "local", "raster")
-    for integrator in integrators[:2] if isinstance(material, Phong) else integrators:    # Phong: textbook form there
+    for integrator in integrators[:2] if isinstance(material, Phong) else integrators:  # Phong: textbook form there
         settings = RenderSettings(size=(24, 24), spp=512, max_depth=2, integrator=integrator)
         means[integrator] = film(device, replace(scene, render=settings)).mean.mean(axis=(0, 1))
     assert min(means["path"]) > 0.005
@@ -254,9 +288,15 @@ def test_light_samples_and_bsdf_samples_agree(device: Device, material: Material
         np.testing.assert_allclose(mean, means["path"], rtol=0.01)
 
 
-@pytest.mark.parametrize("material", [Diffuse(color=COLOR), MetallicRoughness(color=COLOR, specular=0.0),
-                                      MetallicRoughness(color=COLOR, specular=0.0, clearcoat=1e-6)],
-                         ids=["diffuse", "matte", "coated"])
+@pytest.mark.parametrize(
+    "material",
+    [
+        Diffuse(color=COLOR),
+        MetallicRoughness(color=COLOR, specular=0.0),
+        MetallicRoughness(color=COLOR, specular=0.0, clearcoat=1e-6),
+    ],
+    ids=["diffuse", "matte", "coated"],
+)
 def test_matte_bumps_shadow_themselves(device: Device, material: Material) -> None:
     """Diffuse light is Lambert's law for a bent normal times a shadowing factor that fades at the horizon."""
     rng, up = np.random.default_rng(7), np.array([0.0, 0.0, 1.0])
@@ -267,10 +307,13 @@ def test_matte_bumps_shadow_themselves(device: Device, material: Material) -> No
         bump = Texture(picture=Picture(np.array([[[*texel, 255]]], np.uint8)))
         ns, wi[2] = unit(texel / 255 * 2 - 1), abs(wi[2])
         sun = DirectionalLight(direction=tuple(-wi), irradiance=(np.pi,) * 3)
-        scene = replace(furnace(replace(material, normal_map=bump), 0), lights=[sun],
-                        environment=Environment(color=(0.0,) * 3),
-                        camera=Camera(position=(0, 0, 5), up=(0, 1, 0), fov_degrees=20),
-                        render=RenderSettings(size=(4, 4), spp=4, integrator="direct"))
+        scene = replace(
+            furnace(replace(material, normal_map=bump), 0),
+            lights=[sun],
+            environment=Environment(color=(0.0,) * 3),
+            camera=Camera(position=(0, 0, 5), up=(0, 1, 0), fov_degrees=20),
+            render=RenderSettings(size=(4, 4), spp=4, integrator="direct"),
+        )
         expected = max(float(ns @ wi), 0) * bump_shadowing(up, ns, wi) * np.array(COLOR)
         np.testing.assert_allclose(film(device, scene).mean, np.broadcast_to(expected, (4, 4, 3)), rtol=1e-4, atol=1e-6)
 

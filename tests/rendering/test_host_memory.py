@@ -18,7 +18,8 @@ VIEWS: dict[str, Callable[[NDArray[Any]], Any]] = {
     "field": lambda film: film["count"],
     "rows": lambda film: film[1:][:, 2],
     "fields": lambda film: film[list(PIXEL.names or ())],
-    "bytes": lambda film: np.ascontiguousarray(film).reshape(-1).view(np.uint8).data}
+    "bytes": lambda film: np.ascontiguousarray(film).reshape(-1).view(np.uint8).data,
+}
 
 
 def place(array: NDArray[Any]) -> int:

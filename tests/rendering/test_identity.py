@@ -46,16 +46,39 @@ from ..covering import others
 
 #: A value other than the default for each setting and choice.
 OTHER: dict[str, Any] = {
-    "size": (24, 16), "spp": 3, "max_depth": 3, "seed": 7, "integrator": "direct", "shadows": False,
-    "sampler": "independent", "filter": "tent", "adaptive": True, "back_face_culling": "all", "clamp_direct": 1.5,
-    "clamp_indirect": 2.5, "lanes": 1, "layout": "bvh2", "builder": "midpoint", "offset": "ulp", "direct_light": True,
-    "paths": "lanes", "tree": True, "first_hits": True, "triangle": "precomputed", "box": "plain", "sphere": "textbook"}
+    "size": (24, 16),
+    "spp": 3,
+    "max_depth": 3,
+    "seed": 7,
+    "integrator": "direct",
+    "shadows": False,
+    "sampler": "independent",
+    "filter": "tent",
+    "adaptive": True,
+    "back_face_culling": "all",
+    "clamp_direct": 1.5,
+    "clamp_indirect": 2.5,
+    "lanes": 1,
+    "layout": "bvh2",
+    "builder": "midpoint",
+    "offset": "ulp",
+    "direct_light": True,
+    "paths": "lanes",
+    "tree": True,
+    "first_hits": True,
+    "triangle": "precomputed",
+    "box": "plain",
+    "sphere": "textbook",
+}
 TESTS = [each.name for each in fields(HitTests)]
 SETTINGS = [each.name for each in fields(RenderSettings)]
 CHOICES = [each.name for each in fields(Choices) if each.name != "tests"]
 WHITE, DOWN = (1.0, 1.0, 1.0), (0.0, -1.0, 0.0)
-LIGHTS = [PointLight(position=(0.0, 3.0, 0.0), intensity=WHITE), DirectionalLight(direction=DOWN, irradiance=WHITE),
-          SpotLight(position=(0.0, 3.0, 0.0), direction=DOWN, intensity=WHITE)]
+LIGHTS = [
+    PointLight(position=(0.0, 3.0, 0.0), intensity=WHITE),
+    DirectionalLight(direction=DOWN, irradiance=WHITE),
+    SpotLight(position=(0.0, 3.0, 0.0), direction=DOWN, intensity=WHITE),
+]
 #: The only ones that users cannot set directly.
 BY_AOVS = {"direct_light"}
 
@@ -63,8 +86,9 @@ BY_AOVS = {"direct_light"}
 def scene(**given: Any) -> Scene:
     texture = Texture(picture=Picture(np.zeros((2, 2, 4), np.uint8)))
     mesh = clrt.Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), clrt.Diffuse(color=texture))
-    return Scene(**{"meshes": [mesh], "instances": [clrt.Instance(mesh)], "spheres": [clrt.Sphere()],
-                    "lights": LIGHTS, **given})
+    return Scene(
+        **{"meshes": [mesh], "instances": [clrt.Instance(mesh)], "spheres": [clrt.Sphere()], "lights": LIGHTS, **given}
+    )
 
 
 def changed(settings: RenderSettings, choices: Choices, name: str) -> tuple[RenderSettings, Choices]:
@@ -92,14 +116,22 @@ def test_every_setting_and_choice_counts_but_for_those_named(name: str) -> None:
 
 def test_what_is_added_counts_by_itself() -> None:
     """An added setting, choice, part of a scene or material parameter changes the identity without further code."""
-    def more(kind: type, value: object) -> Any:
-        return make_dataclass(f"More{kind.__name__}", [("novel", object, field(default=value, kw_only=True))],
-                              bases=(kind,), frozen=getattr(kind, "__dataclass_params__").frozen, eq=False)
 
-    for kind, made in ((RenderSettings, lambda new: (scene(render=new()), Choices())),
-                       (Choices, lambda new: (scene(), new())),
-                       (Scene, lambda new: (new(), Choices())),
-                       (clrt.Diffuse, lambda new: (scene(spheres=[clrt.Sphere(material=new())]), Choices()))):
+    def more(kind: type, value: object) -> Any:
+        return make_dataclass(
+            f"More{kind.__name__}",
+            [("novel", object, field(default=value, kw_only=True))],
+            bases=(kind,),
+            frozen=getattr(kind, "__dataclass_params__").frozen,
+            eq=False,
+        )
+
+    for kind, made in (
+        (RenderSettings, lambda new: (scene(render=new()), Choices())),
+        (Choices, lambda new: (scene(), new())),
+        (Scene, lambda new: (new(), Choices())),
+        (clrt.Diffuse, lambda new: (scene(spheres=[clrt.Sphere(material=new())]), Choices())),
+    ):
         one, other = (facts_of(*made(more(kind, value))) for value in (1, 2))
         assert differences(one, other) and differences(other, one), kind
     assert differences({**facts_of(scene(), Choices()), "novel": "1"}, facts_of(scene(), Choices()))
@@ -114,8 +146,12 @@ def test_any_edit_of_the_code_that_samples_depend_on_counts(tmp_path: Path) -> N
     found = [code_of(tmp_path)]
     for folder in CODE:
         file = tmp_path / folder / "inner" / "a.py"
-        for change in (lambda: file.write_text("x = 2\n"), lambda: file.rename(file.with_name("b.py")),
-                       lambda: file.with_name("c.py").write_text(""), lambda: file.with_name("b.py").unlink()):
+        for change in (
+            lambda: file.write_text("x = 2\n"),
+            lambda: file.rename(file.with_name("b.py")),
+            lambda: file.with_name("c.py").write_text(""),
+            lambda: file.with_name("b.py").unlink(),
+        ):
             change()
             found.append(code_of(tmp_path))
     assert len(set(found)) == len(found) == 1 + 4 * len(CODE)
@@ -128,14 +164,24 @@ def test_no_other_package_takes_part_in_samples() -> None:
     program = "import sys, clrt.rendering.renderer; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     counted = tuple(f"clrt.{folder.replace('/', '.')}." for folder in CODE)
-    others = {name.split(".")[1] for name in done.stdout.split()
-              if name.startswith("clrt.") and not f"{name}.".startswith(counted)}
+    others = {
+        name.split(".")[1]
+        for name in done.stdout.split()
+        if name.startswith("clrt.") and not f"{name}.".startswith(counted)
+    }
     assert others == {
-        "accel",    # affects rounding only
-        "device", "awake", "threads",    # compile and launch, in any order
-        "formats",    # file names of scenes
-        "aov_types",    # names of AOVs; `direct_light`, which one needs, is a choice
-        "errors", "option_fields", "file_names", "file_mode", "float_errors"}
+        "accel",  # affects rounding only
+        "device",
+        "awake",
+        "threads",  # compile and launch, in any order
+        "formats",  # file names of scenes
+        "aov_types",  # names of AOVs; `direct_light`, which one needs, is a choice
+        "errors",
+        "option_fields",
+        "file_names",
+        "file_mode",
+        "float_errors",
+    }
 
 
 def things(value: Any) -> Iterator[Any]:
@@ -162,7 +208,7 @@ def test_every_field_of_all_that_is_seen_counts() -> None:
                     object.__setattr__(thing, each.name, [12.34] if isinstance(value, list) else 12.34)
                     try:
                         other = None if is_dataclass(value) else scene_hash(content)
-                    except AttributeError:    # the hash read an attribute of that field, which is missing now
+                    except AttributeError:  # the hash read an attribute of that field, which is missing now
                         other = None
                     object.__setattr__(thing, each.name, value)
                     assert (other != found) == (each.name not in NAMES) or is_dataclass(value), (thing, each.name)
@@ -171,7 +217,7 @@ def test_every_field_of_all_that_is_seen_counts() -> None:
 
 def test_unknown_content_is_refused() -> None:
     """Values that cannot be hashed are rejected."""
-    content = scene(environment=clrt.Environment(color=object()))    # type: ignore[arg-type]
+    content = scene(environment=clrt.Environment(color=object()))  # type: ignore[arg-type]
     with pytest.raises(TypeError):
         scene_hash(content)
 
@@ -193,14 +239,29 @@ def test_renderer_farm_and_report_take_every_one(device: Device, name: str) -> N
         assert render_report(renderer, state)[name] == OTHER[name]
 
 
-@pytest.mark.parametrize("change", [{"spp": 5}, {"time": 1.0}, {"error": 0.5}, {"denoise": True}, {"seed": 3},
-                                    {"error_percentile": 90.0}, {"offset": "ulp"}, {"novel": 1}], ids=str)
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"spp": 5},
+        {"time": 1.0},
+        {"error": 0.5},
+        {"denoise": True},
+        {"seed": 3},
+        {"error_percentile": 90.0},
+        {"offset": "ulp"},
+        {"novel": 1},
+    ],
+    ids=str,
+)
 def test_bands_are_of_one_order(change: dict[str, Any]) -> None:
     """Bands of orders that differ in any option, known or not, are not mixed; the device may differ."""
     order = PictureOrder(scene(), {"seed": 1, "error_percentile": 95.0, "device": 0}, spp=4)
     in_order = {each.name for each in fields(order)}
-    other = replace(order, **{name: value for name, value in change.items() if name in in_order},
-                    options=order.options | {name: value for name, value in change.items() if name not in in_order})
+    other = replace(
+        order,
+        **{name: value for name, value in change.items() if name in in_order},
+        options=order.options | {name: value for name, value in change.items() if name not in in_order},
+    )
     facts = [BandedPicture(each, Path("a"))._facts() for each in (order, other)]
     assert differences(*facts) and not differences(facts[0], facts[0])
     elsewhere = replace(order, options=order.options | {"device": 1})
@@ -229,6 +290,7 @@ def test_frames_are_of_one_goal_and_one_view(tmp_path: Path) -> None:
 
 def test_live_settings_are_given_to_the_renderer() -> None:
     """Added settings are passed on, too."""
+
     @dataclass(frozen=True, kw_only=True)
     class More(Settings):
         box: str = "plain"

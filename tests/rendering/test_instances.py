@@ -59,8 +59,14 @@ def by_hand(instance: Instance) -> Mesh:
         turned /= np.linalg.norm(turned, axis=1, keepdims=True)
         tangents = np.column_stack([turned, side * tangents[:, 3]]).astype(np.float32)
     faces = mesh.faces if side > 0 else mesh.faces[:, ::-1].copy()
-    return replace(mesh, vertices=points.astype(np.float32), faces=faces, normals=normals, tangents=tangents,
-                   material=instance.material or mesh.material)
+    return replace(
+        mesh,
+        vertices=points.astype(np.float32),
+        faces=faces,
+        normals=normals,
+        tangents=tangents,
+        material=instance.material or mesh.material,
+    )
 
 
 def matrices(kind: str, scale: float = 1.0) -> Doubles:
@@ -76,13 +82,21 @@ def crowd(kind: str, spheres: int = 2, smooth: bool = True) -> Scene:
     glass, gold = Dielectric(), MetallicRoughness(preset="gold", roughness=0.4)
     mesh, other = ball(smooth), ball(False, Mirror())
     rng, to_world = np.random.default_rng(0), matrices(kind)
-    instances = [Instance(mesh if i % 3 else other, matrix, (None, None, glass, gold)[i % 4])
-                 for i, matrix in enumerate(to_world)]
+    instances = [
+        Instance(mesh if i % 3 else other, matrix, (None, None, glass, gold)[i % 4])
+        for i, matrix in enumerate(to_world)
+    ]
     floor = quad([(-9, -2, 9), (9, -2, 9), (9, -2, -9), (-9, -2, -9)], Diffuse(color=(0.7, 0.6, 0.5)))
     balls = [Sphere(center=tuple(rng.uniform(-2, 2, 3).tolist()), radius=0.2) for _ in range(spheres)]
-    return Scene(meshes=[floor], instances=instances, spheres=balls, render=SETTINGS,
-                 lights=[DirectionalLight(direction=(1, -2, -1), irradiance=(2, 2, 2))],
-                 camera=Camera(position=(0, 1, 9)), environment=Environment(color=(0.4, 0.5, 0.6)))
+    return Scene(
+        meshes=[floor],
+        instances=instances,
+        spheres=balls,
+        render=SETTINGS,
+        lights=[DirectionalLight(direction=(1, -2, -1), irradiance=(2, 2, 2))],
+        camera=Camera(position=(0, 1, 9)),
+        environment=Environment(color=(0.4, 0.5, 0.6)),
+    )
 
 
 def as_meshes(scene: Scene) -> Scene:
@@ -119,16 +133,22 @@ def test_textures_normal_maps_and_colours_go_along(device: Device, kind: str) ->
     count = len(mesh.vertices)
     around = np.cross(mesh.vertices, [0.2, 1, 0.3])
     around /= np.linalg.norm(around, axis=1, keepdims=True)
-    mesh = replace(mesh, uv=rng.random((count, 2), np.float32), uv1=rng.random((count, 2), np.float32),
-                   colors=rng.random((count, 3), np.float32),
-                   tangents=np.column_stack([around, rng.choice([-1.0, 1.0], 1).repeat(count)]).astype(np.float32))
+    mesh = replace(
+        mesh,
+        uv=rng.random((count, 2), np.float32),
+        uv1=rng.random((count, 2), np.float32),
+        colors=rng.random((count, 3), np.float32),
+        tangents=np.column_stack([around, rng.choice([-1.0, 1.0], 1).repeat(count)]).astype(np.float32),
+    )
     noise, bumps = (Picture(rng.integers(low, 256, (4, 4, 4), np.uint8)) for low in (0, 100))
-    bumpy = [Diffuse(color=Texture(picture=noise), normal_map=Texture(picture=bumps, uv_set=uv_set))
-             for uv_set in (0, 1)]
+    bumpy = [
+        Diffuse(color=Texture(picture=noise), normal_map=Texture(picture=bumps, uv_set=uv_set)) for uv_set in (0, 1)
+    ]
     paints = [None, Diffuse(opacity=0.5), *bumpy]
     scene = crowd(kind)
-    scene = replace(scene, instances=[replace(each, mesh=mesh, material=paints[i % 4])
-                                      for i, each in enumerate(scene.instances)])
+    scene = replace(
+        scene, instances=[replace(each, mesh=mesh, material=paints[i % 4]) for i, each in enumerate(scene.instances)]
+    )
     compiled = compile_scene(scene, choices(device))
     assert {"TEXTURES", "NORMAL_MAPS", "VERTEX_COLORS", "OPACITY"} <= set(compiled.features)
     assert compiled.instances == 12
@@ -141,8 +161,10 @@ def test_textures_normal_maps_and_colours_go_along(device: Device, kind: str) ->
 def test_instances_look_like_meshes_after_many_bounces(device: Device) -> None:
     """The channel means agree, from independent random numbers."""
     scene = replace(crowd("stretched"), render=replace(SETTINGS, max_depth=8))
-    films = [film(device, replace(each, render=replace(each.render, seed=seed)), 64)
-             for seed, each in enumerate((scene, as_meshes(scene)))]
+    films = [
+        film(device, replace(each, render=replace(each.render, seed=seed)), 64)
+        for seed, each in enumerate((scene, as_meshes(scene)))
+    ]
     count = films[0].pixels["count"].astype(np.float64)[..., None]
     variance = sum(np.maximum(each.pixels["square"] / count - each.mean**2, 0) / (count - 1) for each in films)
     difference = (films[0].mean - films[1].mean).mean(axis=(0, 1))
@@ -171,13 +193,18 @@ def test_whatever_else_is_in_the_scene(device: Device, rest: str) -> None:
 def test_sizes_do_not_matter(device: Device, mesh_size: float, world_size: float) -> None:
     """Scaling meshes or the world by powers of two leaves the image bit-identical."""
     scene = replace(crowd("stretched", 0), meshes=[])
-    meshes = {id(each.mesh): replace(each.mesh, vertices=each.mesh.vertices * np.float32(mesh_size))
-              for each in scene.instances}
+    meshes = {
+        id(each.mesh): replace(each.mesh, vertices=each.mesh.vertices * np.float32(mesh_size))
+        for each in scene.instances
+    }
     scaled = replace(
-        scene, camera=Camera(position=(0, world_size, 9 * world_size)),
-        instances=[replace(each, mesh=meshes[id(each.mesh)],
-                           to_world=world_size * each.to_world * [*[1 / mesh_size] * 3, 1])
-                   for each in scene.instances])
+        scene,
+        camera=Camera(position=(0, world_size, 9 * world_size)),
+        instances=[
+            replace(each, mesh=meshes[id(each.mesh)], to_world=world_size * each.to_world * [*[1 / mesh_size] * 3, 1])
+            for each in scene.instances
+        ],
+    )
     plain, other = (compile_scene(each, choices(device)) for each in (scene, scaled))
     assert plain.source == other.source
     np.testing.assert_array_equal(film(device, scaled).mean, film(device, scene).mean)
@@ -213,8 +240,9 @@ def test_ten_thousand_instances_need_the_memory_of_one(device: Device) -> None:
     mesh = ball()
     grid = np.stack(np.unravel_index(np.arange(10_000), (100, 100)), axis=1) - 50.0
     moved = [Instance(mesh, np.column_stack([0.4 * np.eye(3), (x, 0, z)])) for x, z in grid]
-    scene = Scene(instances=moved, camera=Camera(position=(0, 30, 60)), environment=Environment(color=(1, 1, 1)),
-                  render=SETTINGS)
+    scene = Scene(
+        instances=moved, camera=Camera(position=(0, 30, 60)), environment=Environment(color=(1, 1, 1)), render=SETTINGS
+    )
     alone = compile_scene(Scene(meshes=[mesh], camera=scene.camera), choices(device))
     compiled = compile_scene(scene, choices(device))
     assert compiled.counts["triangles"][0] == len(mesh.faces) and compiled.instances == 10_000
@@ -247,8 +275,10 @@ def test_checkpoints_tell_instances_apart() -> None:
     moved[3] = replace(moved[3], to_world=moved[3].to_world + 1e-3)
     painted[3] = replace(painted[3], material=Mirror(color=(0.5, 0.5, 0.5)))
     same = replace(scene, instances=[replace(each) for each in scene.instances])
-    facts = [facts_of(each, Choices()) for each in (scene, same, replace(scene, instances=moved),
-                                                    replace(scene, instances=painted))]
+    facts = [
+        facts_of(each, Choices())
+        for each in (scene, same, replace(scene, instances=moved), replace(scene, instances=painted))
+    ]
     assert facts[0] == facts[1]
     assert all(facts[0]["instances"] != other["instances"] for other in facts[2:])
 
@@ -262,13 +292,19 @@ def test_numbers_of_objects(device: Device, few: int, monkeypatch: pytest.Monkey
     other, once = replace(wall, material=Mirror()), replace(wall, material=Dielectric())
     lamp = Diffuse(emission=(1, 1, 1))
     shown = [(wall, None), (other, None), (wall, lamp), (other, None), (once, None), (wall, None)]
-    instances = [Instance(mesh, np.column_stack([np.eye(3), (x + 2, 0, 0)]), material)
-                 for x, (mesh, material) in enumerate(shown)]
+    instances = [
+        Instance(mesh, np.column_stack([np.eye(3), (x + 2, 0, 0)]), material)
+        for x, (mesh, material) in enumerate(shown)
+    ]
     ground = replace(wall, vertices=wall.vertices + np.array([1, 0, 0], np.float32))
-    scene = Scene(meshes=[wall, ground], instances=instances, environment=Environment(color=(1, 1, 1)),
-                  spheres=[Sphere(center=(8, 0, 0), radius=0.4, material=Mirror())],
-                  camera=Camera(position=(4.5, 0, 50), look_at=(4.5, 0, 0), fov_degrees=1.146),
-                  render=RenderSettings(size=(10, 1)))
+    scene = Scene(
+        meshes=[wall, ground],
+        instances=instances,
+        environment=Environment(color=(1, 1, 1)),
+        spheres=[Sphere(center=(8, 0, 0), radius=0.4, material=Mirror())],
+        camera=Camera(position=(4.5, 0, 50), look_at=(4.5, 0, 0), fov_degrees=1.146),
+        render=RenderSettings(size=(10, 1)),
+    )
     running = session(device, scene)
     assert running.compiled.instances == (0 if few else 5)
     found = first_hits(running, scene, ["object", "material", "primitive"])

@@ -70,8 +70,8 @@ def test_passes(device: Device, small_launches: None, count: int, adaptive: bool
 
 @pytest.mark.parametrize("lens", [0.0, 0.2])
 def test_look(device: Device, lens: float) -> None:
-    """A renderer interrupted while it changes camera gives the same image there, also if a lens needs another program.
-    """
+    """A renderer interrupted while it changes camera gives the same image there, also if a lens needs another
+    program."""
     scene = room()
     there = replace(scene.camera, position=(0.3, 0.2, 4.0), aperture_radius=lens)
     other = Renderer(replace(scene, camera=there), device=device.info.index, size=SIZE, spp=SPP)
@@ -92,8 +92,10 @@ def test_refit(device: Device) -> None:
     vertices, faces = rng.random((900, 3)), np.arange(900).reshape(-1, 3)
     rays = rng.random((2000, 3)), rng.normal(size=(2000, 3))
     moved = vertices[:, ::-1].copy()
-    before, after = (clrt.RayQuery(points, faces, device=device.info.index, layout="bvh2", builder="ploc")
-                     for points in (vertices, moved))
+    before, after = (
+        clrt.RayQuery(points, faces, device=device.info.index, layout="bvh2", builder="ploc")
+        for points in (vertices, moved)
+    )
     expected = [each.closest_hit(*rays)["primitive"] for each in (before, after)]
     lines = run(lambda: before.refit(moved))
     for place in places(lines):

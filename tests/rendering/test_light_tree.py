@@ -31,9 +31,17 @@ def coincident() -> Scene:
     return Scene(lights=[*point_lights(np.full((100, 3), 0.25)), *point_lights(np.zeros((100, 3)), 3.0)])
 
 
-SCENES = {"two": lamps(2), "few": lamps(32), "a tree": lamps(33), "many": lamps(1000), "coincident": coincident(),
-          "suns and sky": with_infinite(Scene()), "lamp and infinite": with_infinite(lamps(1)),
-          "few and infinite": with_infinite(lamps(20)), "many and infinite": with_infinite(lamps(300))}
+SCENES = {
+    "two": lamps(2),
+    "few": lamps(32),
+    "a tree": lamps(33),
+    "many": lamps(1000),
+    "coincident": coincident(),
+    "suns and sky": with_infinite(Scene()),
+    "lamp and infinite": with_infinite(lamps(1)),
+    "few and infinite": with_infinite(lamps(20)),
+    "many and infinite": with_infinite(lamps(300)),
+}
 
 
 def probabilities(probe: Probe, point: Doubles, normal: Doubles) -> Doubles:
@@ -87,26 +95,38 @@ def test_no_light_that_can_be_seen_is_left_out(device: Device, count: int) -> No
     probe = Probe(device, scene)
     corners = np.array([mesh.vertices for mesh in scene.meshes]).reshape(-1, 3, 3).astype(np.float64)
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    middles = np.concatenate([corners.mean(axis=1), [s.center for s in scene.spheres],
-                              [light.position for light in scene.lights if isinstance(light, PointLight)]])
+    middles = np.concatenate(
+        [
+            corners.mean(axis=1),
+            [s.center for s in scene.spheres],
+            [light.position for light in scene.lights if isinstance(light, PointLight)],
+        ]
+    )
     left = 0
     for point, normal in zip(*points_and_normals(50)):
         to_light = middles - point
         seen = to_light @ normal > 1e-5
-        seen[:len(facing)] &= np.sum(to_light[:len(facing)] * facing, axis=1) < -1e-9
+        seen[: len(facing)] &= np.sum(to_light[: len(facing)] * facing, axis=1) < -1e-9
         mass = probabilities(probe, point, normal)
         assert np.all(mass[seen] > 0)
         left += int(np.sum(mass == 0))
-    assert left > 0.1 * count * 50     # about half are below the horizon
+    assert left > 0.1 * count * 50  # about half are below the horizon
 
 
 def test_balls_bring_nothing_to_their_own_surface(device: Device) -> None:
     """For any rounding of the point; if the normal is tilted by a tenth, a part of the sphere is above the horizon."""
     rng = np.random.default_rng(5)
     centers, radii, shining = rng.normal(size=(20, 3)), 10 ** rng.uniform(-2, 0, 20), Diffuse(emission=(1.0, 1.0, 1.0))
-    probe = Probe(device, Scene(spheres=[Sphere(center=(x, y, z), radius=radius, material=shining)
-                                         for (x, y, z), radius in zip(centers.tolist(), radii.tolist())]))
-    own = np.arange(1, 20).repeat(100)    # not the first light, which is chosen if none contributes
+    probe = Probe(
+        device,
+        Scene(
+            spheres=[
+                Sphere(center=(x, y, z), radius=radius, material=shining)
+                for (x, y, z), radius in zip(centers.tolist(), radii.tolist())
+            ]
+        ),
+    )
+    own = np.arange(1, 20).repeat(100)  # not the first light, which is chosen if none contributes
     normals = unit_vectors(rng, len(own))
     points = probe.compiled.frame.points(centers[own] + radii[own, None] * normals)
     aside = normals + 0.1 * np.cross(normals, unit_vectors(rng, len(own)))
@@ -122,7 +142,7 @@ def test_few_lights_are_chosen_by_what_they_bring(device: Device) -> None:
     probe = Probe(device, Scene(lights=[light for p, i in zip(places, powers) for light in point_lights(p[None], i)]))
     for point, normal in zip(*points_and_normals(20)):
         d = places - point
-        brought = np.maximum(powers * (d @ normal) / np.linalg.norm(d, axis=1)**3, 0)
+        brought = np.maximum(powers * (d @ normal) / np.linalg.norm(d, axis=1) ** 3, 0)
         expected = 0.8 * brought / brought.sum() + 0.2 * (brought > 0) / np.sum(brought > 0)
         np.testing.assert_allclose(probabilities(probe, point, normal), expected, rtol=2e-5, atol=1e-7)
 
@@ -136,10 +156,10 @@ def test_a_tree_is_nearly_as_good(device: Device) -> None:
     chosen, even = [], []
     for x, z in np.random.default_rng(3).uniform(-9, 9, (20, 2)):
         d = places - [x, 0.0, z]
-        brought = d[:, 1] / np.linalg.norm(d, axis=1)**3
+        brought = d[:, 1] / np.linalg.norm(d, axis=1) ** 3
         mass = probabilities(probe, np.array([x, 0.0, z]), UP)
-        chosen.append(np.sum(brought**2 / mass) / brought.sum()**2 - 1)
-        even.append(np.sum(brought**2) * len(brought) / brought.sum()**2 - 1)
+        chosen.append(np.sum(brought**2 / mass) / brought.sum() ** 2 - 1)
+        even.append(np.sum(brought**2) * len(brought) / brought.sum() ** 2 - 1)
     assert np.mean(chosen) < 1 < 10 < np.mean(even)
 
 
@@ -147,8 +167,12 @@ def test_black_lights_are_left_out(device: Device) -> None:
     """Lights without power or area are dropped and do not affect the others."""
     lit, dark = lamps(50), Diffuse(emission=(0.0, 0.0, 0.0))
     flat = Mesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.int32), Diffuse(emission=(9.0, 9.0, 9.0)))
-    zeros = replace(lit, meshes=[flat, *lit.meshes, flat], spheres=[Sphere(radius=0.1, material=dark), *lit.spheres],
-                    lights=[*point_lights(np.zeros((2, 3)), 0.0), *lit.lights])
+    zeros = replace(
+        lit,
+        meshes=[flat, *lit.meshes, flat],
+        spheres=[Sphere(radius=0.1, material=dark), *lit.spheres],
+        lights=[*point_lights(np.zeros((2, 3)), 0.0), *lit.lights],
+    )
     probes = Probe(device, lit), Probe(device, zeros)
     point, normal = np.array([0.1, 0.2, 0.3]), UP
     with_black, without = (probabilities(probe, point, normal) for probe in probes)
@@ -167,8 +191,8 @@ def test_powers_of_any_unit(device: Device, power: float) -> None:
 
 
 def test_a_hundred_thousand_triangles(device: Device) -> None:
-    """A closed emitter of 10^5 triangles: those facing the point have positive probability, the others little; sum 1.
-    """
+    """A closed emitter of 10^5 triangles: those facing the point have positive probability, the others little; sum
+    1."""
     side = 224
     v, u = np.meshgrid(np.linspace(0, np.pi, side + 1), np.linspace(0, 2 * np.pi, side + 1), indexing="ij")
     sphere = np.stack([np.sin(v) * np.sin(u), np.cos(v), np.sin(v) * np.cos(u)], axis=-1).reshape(-1, 3)

@@ -44,10 +44,21 @@ def random_light(kind: type[Light], seed: int) -> Light:
     draws = Draws(seed, seed, seed)
     x, z = draws.between(-1, 1), draws.between(-1, 1)
     while True:
-        light = draws.record(kind, **fields_of(kind, {
-            "position": (x, 2.0, z), "direction": (-x, -2.0, -z), "intensity": draws.vector(1.0, 9.0),
-            "irradiance": draws.vector(0.5, 2.0), "radiance": draws.vector(1.0, 9.0), "radius": 0.5,
-            "range": draws.between(3.0, 6.0) if seed % 2 else None}))
+        light = draws.record(
+            kind,
+            **fields_of(
+                kind,
+                {
+                    "position": (x, 2.0, z),
+                    "direction": (-x, -2.0, -z),
+                    "intensity": draws.vector(1.0, 9.0),
+                    "irradiance": draws.vector(0.5, 2.0),
+                    "radiance": draws.vector(1.0, 9.0),
+                    "radius": 0.5,
+                    "range": draws.between(3.0, 6.0) if seed % 2 else None,
+                },
+            ),
+        )
         if not light.conflicts():
             return light
 
@@ -62,13 +73,13 @@ def points(count: int) -> tuple[Doubles, Doubles]:
     """Return points around the origin, many of them close to it, and unit normals in all directions."""
     rng = np.random.default_rng(5)
     n = rng.normal(size=(count, 3))
-    return rng.normal(size=(count, 3)) * 10**rng.uniform(-4, 0.5, (count, 1)), n / np.linalg.norm(n, axis=1)[:, None]
+    return rng.normal(size=(count, 3)) * 10 ** rng.uniform(-4, 0.5, (count, 1)), n / np.linalg.norm(n, axis=1)[:, None]
 
 
 def test_distant_lights_come_last_and_no_kernel_twice() -> None:
     assert len(set(TYPES)) == len(TYPES)
     distant = [name for kind in LIGHTS if kind.distant for name in kind.kernels()]
-    assert distant and list(LIGHT_KERNELS[-len(distant):]) == distant
+    assert distant and list(LIGHT_KERNELS[-len(distant) :]) == distant
 
 
 @pytest.mark.parametrize("kind", LIGHTS)

@@ -39,7 +39,7 @@ def irradiances(probe: Probe, points: Doubles, normal: Doubles = UP) -> tuple[Do
 def assert_mean(probe: Probe, points: Doubles, expected: Doubles) -> None:
     mean, variance = irradiances(probe, points)
     # In addition to the noise there are a dozen roundings of float32, 1e-6 of the mean, which do not average out.
-    p = mean_test(mean, variance + COUNT * (1e-6 * expected)**2, COUNT, expected)
+    p = mean_test(mean, variance + COUNT * (1e-6 * expected) ** 2, COUNT, expected)
     assert p.min() > sidak(FAMILY, p.size), (mean, expected)
 
 
@@ -51,8 +51,8 @@ def sphere_irradiance(center: Doubles, radius: float, points: Doubles) -> Double
 
 
 def rectangle_irradiance(x0: float, x1: float, z0: float, z1: float, height: float, points: Doubles) -> Doubles:
-    """Return E = pi L F, F the form factor of a rectangle parallel to the receiver, summed over corners (Howell, B-3).
-    """
+    """Return E = pi L F, F the form factor of a rectangle parallel to the receiver, summed over corners (Howell,
+    B-3)."""
 
     def corner(x: Doubles, z: Doubles) -> Doubles:
         h = height - points[:, 1]
@@ -72,8 +72,9 @@ def rectangle(x0: float, x1: float, z0: float, z1: float, height: float) -> Mesh
     return Mesh(np.array(corners, np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.int32), LAMP)
 
 
-@pytest.mark.parametrize(("center", "radius"), [((0.3, 3.0, 0.2), 1.5), ((1.0, 2.0, -1.0), 0.01),
-                                                ((0.0, 1e4, 3e3), 1.0)])
+@pytest.mark.parametrize(
+    ("center", "radius"), [((0.3, 3.0, 0.2), 1.5), ((1.0, 2.0, -1.0), 0.01), ((0.0, 1e4, 3e3), 1.0)]
+)
 def test_sphere(device: Device, center: tuple[float, float, float], radius: float) -> None:
     probe = Probe(device, Scene(spheres=[Sphere(center=center, radius=radius, material=LAMP)]))
     assert_mean(probe, POINTS, sphere_irradiance(np.array(center), radius, POINTS))
@@ -85,8 +86,9 @@ def test_inside_a_sphere_light_is_darkness(device: Device) -> None:
     assert not probe("light_sample", 12, inside, np.tile(UP, (3, 1)), seed=0)[:, 3:6].any()
 
 
-@pytest.mark.parametrize("side", [(-1.0, 0.7, -0.4, 1.5), (0.25, 0.25 + 2.0**-10, -0.5, 2.0**-10 - 0.5)],
-                         ids=["large", "tiny"])
+@pytest.mark.parametrize(
+    "side", [(-1.0, 0.7, -0.4, 1.5), (0.25, 0.25 + 2.0**-10, -0.5, 2.0**-10 - 0.5)], ids=["large", "tiny"]
+)
 def test_rectangle(device: Device, side: tuple[float, float, float, float]) -> None:
     probe = Probe(device, Scene(meshes=[rectangle(*side, 2.0)]))
     assert_mean(probe, POINTS, rectangle_irradiance(*side, 2.0, POINTS))
@@ -102,7 +104,7 @@ def test_point(device: Device) -> None:
     position, intensity = np.array([1.5, 4.0, 3.0]), np.array([60.0, 58.0, 50.0])
     probe = Probe(device, Scene(lights=[PointLight(position=(1.5, 4.0, 3.0), intensity=(60.0, 58.0, 50.0))]))
     d = position - POINTS
-    expected = np.outer(d[:, 1] / np.sum(d * d, axis=1)**1.5, intensity)
+    expected = np.outer(d[:, 1] / np.sum(d * d, axis=1) ** 1.5, intensity)
     mean, variance = irradiances(probe, POINTS)
     np.testing.assert_allclose(mean, expected, rtol=1e-6)
     assert np.all(variance < 1e-20)
@@ -120,12 +122,21 @@ def test_directional(device: Device) -> None:
 def test_all_together(device: Device) -> None:
     """E is the sum over all lights, each chosen with its probability."""
     side = (1.0, 2.0, -2.0, -1.0)
-    scene = Scene(meshes=[rectangle(*side, 3.0)], spheres=[Sphere(center=(-1.0, 4.0, 1.0), radius=0.5, material=LAMP)],
-                  lights=[PointLight(position=(0.0, 5.0, 0.0), intensity=(5.0, 50.0, 10.0)),
-                          DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 2.0, 3.0))])
+    scene = Scene(
+        meshes=[rectangle(*side, 3.0)],
+        spheres=[Sphere(center=(-1.0, 4.0, 1.0), radius=0.5, material=LAMP)],
+        lights=[
+            PointLight(position=(0.0, 5.0, 0.0), intensity=(5.0, 50.0, 10.0)),
+            DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 2.0, 3.0)),
+        ],
+    )
     d = np.array([0.0, 5.0, 0.0]) - POINTS
-    expected = (rectangle_irradiance(*side, 3.0, POINTS) + sphere_irradiance(np.array([-1.0, 4.0, 1.0]), 0.5, POINTS)
-                + np.outer(d[:, 1] / np.sum(d * d, axis=1)**1.5, [5.0, 50.0, 10.0]) + np.array([1.0, 2.0, 3.0]))
+    expected = (
+        rectangle_irradiance(*side, 3.0, POINTS)
+        + sphere_irradiance(np.array([-1.0, 4.0, 1.0]), 0.5, POINTS)
+        + np.outer(d[:, 1] / np.sum(d * d, axis=1) ** 1.5, [5.0, 50.0, 10.0])
+        + np.array([1.0, 2.0, 3.0])
+    )
     assert_mean(Probe(device, scene), POINTS, expected)
 
 
@@ -159,14 +170,17 @@ def test_shadow_rays_end_before_a_lamp_near_by(device: Device, kind: str) -> Non
     for _ in range(20):
         size, turn = 10.0 ** rng.uniform(-2, 3), np.linalg.qr(rng.normal(size=(3, 3)))[0]
         normal, gaps = turn[:, 2], size * 10.0 ** rng.uniform(-4, 1, (1 << 14, 1))
-        place = size * 10.0 ** rng.uniform(-8, 0) * rng.uniform(-1, 1, 3)    # of its frontmost point or centre
+        place = size * 10.0 ** rng.uniform(-8, 0) * rng.uniform(-1, 1, 3)  # of its frontmost point or centre
         corners = (np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]]) @ turn[:, :2].T * size + place).astype(np.float32)
-        faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)[:2 if kind == "quad" else 1]
+        faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)[: 2 if kind == "quad" else 1]
         if np.cross(corners[1] - corners[0], corners[2] - corners[0]) @ normal < 0:
             faces = faces[:, ::-1].copy()
         center = tuple((place - size * normal).tolist())
-        scene = (Scene(spheres=[Sphere(center=center, radius=size, material=LAMP)]) if kind == "sphere" else
-                 Scene(meshes=[Mesh(corners, faces, LAMP)]))
+        scene = (
+            Scene(spheres=[Sphere(center=center, radius=size, material=LAMP)])
+            if kind == "sphere"
+            else Scene(meshes=[Mesh(corners, faces, LAMP)])
+        )
         points = (place + gaps * normal).astype(np.float32).astype(np.float64)
         probe = Probe(device, scene, layout="bvh8")
         sample = probe("light_sample", 12, points, np.tile(-normal, (len(points), 1)), seed=4)
@@ -184,7 +198,11 @@ def points_and_normals(count: int) -> tuple[Doubles, Doubles]:
 
 def scattered_lamps() -> Scene:
     """Return emitters that do not occlude each other seen from the unit cube."""
-    return Scene(meshes=[rectangle(3.0, 5.0, -1.0, 1.0, 3.0)],
-                 spheres=[Sphere(center=(-4.0, 2.0, 1.0), radius=0.5, material=LAMP),
-                          Sphere(center=(0.0, 5000.0, 2000.0), radius=20.0, material=LAMP),
-                          Sphere(center=(0.0, 20.0, -60.0), radius=0.1, material=LAMP)])
+    return Scene(
+        meshes=[rectangle(3.0, 5.0, -1.0, 1.0, 3.0)],
+        spheres=[
+            Sphere(center=(-4.0, 2.0, 1.0), radius=0.5, material=LAMP),
+            Sphere(center=(0.0, 5000.0, 2000.0), radius=20.0, material=LAMP),
+            Sphere(center=(0.0, 20.0, -60.0), radius=0.1, material=LAMP),
+        ],
+    )

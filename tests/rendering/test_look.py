@@ -28,10 +28,14 @@ def last(renderer: Renderer) -> State:
 
 @pytest.mark.parametrize(("count", "cameras"), [(1, [ASIDE, LENS, LENS, HERE]), (2, [ASIDE])], ids=["alone", "crew"])
 def test_pictures_are_those_of_new_renderers(device: Device, count: int, cameras: list[Camera]) -> None:
-    """Also after an image that was left unfinished; adding or removing a lens switches to another program and session.
-    """
-    given: dict[str, Any] = {"size": (40, 30), "device": [device.info.index] * count, "spp": 6,
-                             "aovs": "depth,variance"}
+    """Also after an image that was left unfinished; adding or removing a lens switches to another program and
+    session."""
+    given: dict[str, Any] = {
+        "size": (40, 30),
+        "device": [device.info.index] * count,
+        "spp": 6,
+        "aovs": "depth,variance",
+    }
     renderer = Renderer(room(), **given)
     tree, sessions = renderer.compiled.tree, [renderer.session]
     next(renderer.passes(spp=50))
@@ -51,8 +55,12 @@ def test_pictures_are_those_of_new_renderers(device: Device, count: int, cameras
 def test_far_scenes_have_cameras_in_their_frame(device: Device) -> None:
     """A scene with another unit and origin: the camera is transformed into its frame."""
     scene = room()
-    moved = replace(scene, spheres=[], camera=Camera(position=(0.0, 2e9, 3.9e9), look_at=(0.0, 1e9, 0.0)),
-                    meshes=[replace(mesh, vertices=mesh.vertices * np.float32(1e9)) for mesh in scene.meshes])
+    moved = replace(
+        scene,
+        spheres=[],
+        camera=Camera(position=(0.0, 2e9, 3.9e9), look_at=(0.0, 1e9, 0.0)),
+        meshes=[replace(mesh, vertices=mesh.vertices * np.float32(1e9)) for mesh in scene.meshes],
+    )
     renderer = Renderer(moved, size=(24, 16), device=device.info.index)
     assert renderer.compiled.frame.unit != 1
     aside = replace(moved.camera, fov_degrees=20.0)

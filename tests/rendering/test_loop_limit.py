@@ -44,8 +44,9 @@ def shining_ball(rows: int) -> Mesh:
 
 def scene(rows: int = 3) -> Scene:
     """Return a scene whose image at depth d is 0.01 d."""
-    return Scene(meshes=[shining_ball(rows)],
-                 camera=Camera(position=(0.1, 0.2, 0.3), look_at=(0.0, -0.1, -1.0), fov_degrees=70))
+    return Scene(
+        meshes=[shining_ball(rows)], camera=Camera(position=(0.1, 0.2, 0.3), look_at=(0.0, -0.1, -1.0), fov_degrees=70)
+    )
 
 
 def picture(device: Device, depth: int = 6, rows: int = 3, spp: int = SPP) -> NDArray[np.float32]:
@@ -70,8 +71,9 @@ def test_short_launches_change_nothing(device: Device, turns: int, monkeypatch: 
     limit(monkeypatch, turns)
     launched = list[WorkPart]()
 
-    def cut(*arguments: Any, original: Callable[..., WorkPart | None] = WorkQueue.cut,
-            **limits: Any) -> WorkPart | None:
+    def cut(
+        *arguments: Any, original: Callable[..., WorkPart | None] = WorkQueue.cut, **limits: Any
+    ) -> WorkPart | None:
         part = original(*arguments, **limits)
         launched.extend([part] if part else [])
         return part
@@ -90,8 +92,14 @@ def test_work_is_shortened_in_order() -> None:
     while work.parts:
         done.append(work.cut(100, 2, most_tiles=2, most_samples=3))
     work.settle()
-    assert done == [WorkPart(0, 2, 0, 3), WorkPart(2, 3, 0, 3), WorkPart(0, 2, 3, 3), WorkPart(2, 3, 3, 3),
-                    WorkPart(0, 2, 6, 1), WorkPart(2, 3, 6, 1)]
+    assert done == [
+        WorkPart(0, 2, 0, 3),
+        WorkPart(2, 3, 0, 3),
+        WorkPart(0, 2, 3, 3),
+        WorkPart(2, 3, 3, 3),
+        WorkPart(0, 2, 6, 1),
+        WorkPart(2, 3, 6, 1),
+    ]
     assert work.samples.tolist() == [[7, 7, 7]]
 
 
@@ -116,8 +124,12 @@ def test_too_many_turns_are_refused(device: Device) -> None:
 def test_too_long_lists_are_refused(device: Device) -> None:
     triangles = np.zeros((100_000, 3, 3), np.float32)
     triangles += np.arange(100_000, dtype=np.float32)[:, None, None] / 64 + np.eye(3, dtype=np.float32)
-    query = RayQuery(triangles.reshape(-1, 3), np.arange(300_000, dtype=np.int32).reshape(-1, 3),
-                     device=device.info.id, layout="list")
+    query = RayQuery(
+        triangles.reshape(-1, 3),
+        np.arange(300_000, dtype=np.int32).reshape(-1, 3),
+        device=device.info.id,
+        layout="list",
+    )
     rays = [(-1.0, -1.0, -1.0), (3000.0, 0.0, 0.0)], [(1.0, 1.0, 1.0), (0.0, 1.0, 0.0)]
     if loop_turns(device) is None:
         assert query.closest_hit(*rays)["primitive"].tolist() == [0, -1]
@@ -130,12 +142,14 @@ def test_too_long_lists_are_refused(device: Device) -> None:
 
 @pytest.mark.combinations
 @pytest.mark.parametrize("entry", ["guides", "first_hit"])
-def test_pixels_that_were_ended_are_missed(device: Device, entry: str, tmp_path: Path,
-                                           monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pixels_that_were_ended_are_missed(
+    device: Device, entry: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     limit(monkeypatch, 50_000)
     render: dict[str, Callable[[Accumulation], dict[str, Any]]] = {
         "guides": render_guides,
-        "first_hit": lambda session: first_hits(session, scene(), ["normal", "depth"])}
+        "first_hit": lambda session: first_hits(session, scene(), ["normal", "depth"]),
+    }
     seen = render[entry](Renderer(scene(), device=device.info.id, size=SIZE).session)
     assert all(np.isfinite(picture).all() for picture in seen.values())
     folder = sabotaged(tmp_path / "kernels", r"return a != 31;", "return a != 31 || get_global_id(0) % 5 == 0;")

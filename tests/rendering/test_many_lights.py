@@ -44,11 +44,11 @@ def light_irradiance(scene: Scene, point: Doubles) -> Doubles:
             total += np.array(mesh.material.emission) * triangle_irradiance(face - point)
     for sphere in scene.spheres:
         d = np.array(sphere.center) - point
-        total += np.pi * np.array(sphere.material.emission) * sphere.radius**2 * d[1] / np.linalg.norm(d)**3
+        total += np.pi * np.array(sphere.material.emission) * sphere.radius**2 * d[1] / np.linalg.norm(d) ** 3
     for light in scene.lights:
         assert isinstance(light, PointLight)
         d = np.array(light.position) - point
-        total += np.array(light.intensity) * d[1] / np.linalg.norm(d)**3
+        total += np.array(light.intensity) * d[1] / np.linalg.norm(d) ** 3
     return total
 
 
@@ -63,7 +63,7 @@ def test_irradiance_by_many_lights(device: Device, count: int) -> None:
         out = probe("light_sample", 12, np.tile(np.append(point, UP), (1 << 18, 1)), seed=seed)
         values = out[:, 3:6] * (np.maximum(out[:, 1], 0) / out[:, 6])[:, None]
         expected = light_irradiance(scene, point)
-        variance = values.var(axis=0) + len(values) * (1e-5 * expected)**2
+        variance = values.var(axis=0) + len(values) * (1e-5 * expected) ** 2
         p_values.append(mean_test(values.mean(axis=0), variance, len(values), expected))
     assert np.min(p_values) > sidak(FAMILY, np.size(p_values))
 
@@ -78,7 +78,7 @@ def test_a_met_lamp_has_the_density_of_its_samples(device: Device, scene: Scene)
     same = (met[:, 4] >= 0) & np.all(met[:, :3] == sample[:, 3:6], axis=1) & sample[:, 3:6].any(axis=1)
     same &= sample[:, 10] == 0
     assert np.mean(same) > 0.1
-    np.testing.assert_allclose(met[same, 3], sample[same, 6], rtol=2e-3)    # less precise near a sphere's edge
+    np.testing.assert_allclose(met[same, 3], sample[same, 6], rtol=2e-3)  # less precise near a sphere's edge
 
 
 def test_a_met_sky_has_the_density_of_its_samples(device: Device) -> None:
@@ -96,8 +96,12 @@ def test_pictures_of_parts_add_up(device: Device) -> None:
     """The image of a floor under 90 lights with a light BVH equals the sum of images with subsets of them."""
     scene = lamps(90, seed=8, low=0.1)
     floor = quad([(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], Diffuse(color=(0.5, 0.5, 0.5)))
-    scene = replace(scene, meshes=[floor, *scene.meshes], camera=Camera(position=(0.0, 0.5, 3.0), fov_degrees=30),
-                    render=RenderSettings(size=(32, 24), max_depth=2, spp=512, sampler="independent"))
+    scene = replace(
+        scene,
+        meshes=[floor, *scene.meshes],
+        camera=Camera(position=(0.0, 0.5, 3.0), fov_degrees=30),
+        render=RenderSettings(size=(32, 24), max_depth=2, spp=512, sampler="independent"),
+    )
     black = Diffuse(color=(0.0, 0.0, 0.0))
     dark_meshes = [floor, *(replace(mesh, material=black) for mesh in scene.meshes[1:])]
     dark_spheres = [replace(sphere, material=black) for sphere in scene.spheres]
@@ -113,4 +117,4 @@ def picture_mean(device: Device, scene: Scene) -> tuple[Doubles, Doubles]:
     pixels, count = film(device, scene).pixels.ravel(), scene.render.spp
     sums, squares = (pixels[name].astype(np.float64) + pixels[f"{name}_error"] for name in ("sum", "square"))
     mean = sums / count
-    return mean.mean(axis=0), np.sum(squares / count - mean**2, axis=0) / (count - 1) / len(pixels)**2
+    return mean.mean(axis=0), np.sum(squares / count - mean**2, axis=0) / (count - 1) / len(pixels) ** 2

@@ -27,8 +27,10 @@ def textured(kind: type[Material], rng: np.random.Generator) -> Material:
     while True:
         names = [field.name for field in fields(kind) if Texture in get_args(hints[field.name]) and rng.random() < 0.5]
         texels = rng.integers(0, 256, (len(names), 2, 2, 4), np.uint8)
-        found: dict[str, Any] = {name: Texture(picture=Picture(each), factor=float(rng.uniform(0.1, 0.9)))
-                                 for name, each in zip(names, texels)}
+        found: dict[str, Any] = {
+            name: Texture(picture=Picture(each), factor=float(rng.uniform(0.1, 0.9)))
+            for name, each in zip(names, texels)
+        }
         material = replace(chosen[int(rng.integers(len(chosen)))], **found)
         if not material.conflicts():
             return material
@@ -67,10 +69,14 @@ def test_materials_are_packed_together_as_alone(kind: type[Material], seed: int)
     together = pack_materials(users, textures, tables, "none")
     _, records = together.buffers[kind.kernel]
     for code, user in zip(together.codes, users):
-        record, (_, (alone,)) = records[code >> 4], pack_materials([user], textures, tables,
-                                                                   "none").buffers[kind.kernel]
+        record, (_, (alone,)) = (
+            records[code >> 4],
+            pack_materials([user], textures, tables, "none").buffers[kind.kernel],
+        )
         # Arrays are as long as the longest of the type, padded with zeros.
-        assert all(np.array_equal(np.ravel(record[name])[:alone[name].size], np.ravel(alone[name]))
-                   for name in names_of(alone))
+        assert all(
+            np.array_equal(np.ravel(record[name])[: alone[name].size], np.ravel(alone[name]))
+            for name in names_of(alone)
+        )
         others = names_of(records) - names_of(alone)
         assert all(record[name] == -1 for name in others if name.endswith("_texture"))

@@ -51,8 +51,9 @@ def test_same_picture(device: Device, adaptive: bool, stops: dict[str, float], c
 
 
 @pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
-def test_interrupted_it_goes_on_alone_and_together(device: Device, tmp_path: Path, small_launches: None,
-                                                   adaptive: bool) -> None:
+def test_interrupted_it_goes_on_alone_and_together(
+    device: Device, tmp_path: Path, small_launches: None, adaptive: bool
+) -> None:
     """Checkpoints of one, two and three devices resume from each other, also inside a pass."""
     at_once = renderer(device, adaptive=adaptive)
     run(at_once, spp=24)
@@ -79,7 +80,7 @@ def test_passes_left_after_any_launch(device: Device, small_launches: None, coun
         begun = session.render(3)
         for _ in range(left_after):
             next(begun, None)
-        begun.close()   # type: ignore[attr-defined]
+        begun.close()  # type: ignore[attr-defined]
         while session.samples_done < 4:
             list(session.advance(lambda done: 4 - done))
         assert session.film().pixels.tobytes() == expected
@@ -87,8 +88,14 @@ def test_passes_left_after_any_launch(device: Device, small_launches: None, coun
 
 @pytest.mark.parametrize("when", [2, 5, 9, 14])
 @pytest.mark.parametrize("where", ["begin", "ended"])
-def test_one_that_fails_is_left_out(device: Device, small_launches: None, caplog: pytest.LogCaptureFixture,
-                                    monkeypatch: pytest.MonkeyPatch, when: int, where: str) -> None:
+def test_one_that_fails_is_left_out(
+    device: Device,
+    small_launches: None,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    when: int,
+    where: str,
+) -> None:
     """If a device fails at any time, its shares are rendered again, including those in flight."""
     at_once = renderer(device)
     run(at_once, spp=24)
@@ -127,8 +134,9 @@ def _fail_after(worker: DeviceWorker, where: str, calls: int, monkeypatch: pytes
     monkeypatch.setattr(worker, where, fails)
 
 
-def test_ctrl_c_among_the_notes_of_a_launch(device: Device, small_launches: None,
-                                            monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_among_the_notes_of_a_launch(
+    device: Device, small_launches: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """An interrupt between the updates of the launch list and of the share: nothing waits for a missing launch, and no
     sample is lost or counted twice."""
     at_once = renderer(device)
@@ -151,10 +159,14 @@ def test_ctrl_c_among_the_notes_of_a_launch(device: Device, small_launches: None
         assert same(at_once, running), method
 
 
-@pytest.mark.parametrize(("call", "error"), [("lent", cl.RuntimeError("OUT_OF_RESOURCES")),
-                                             ("build", KernelError("it has no compiler"))], ids=repr)
-def test_one_that_cannot_begin_is_left_out(device: Device, caplog: pytest.LogCaptureFixture, call: str,
-                                           error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("call", "error"),
+    [("lent", cl.RuntimeError("OUT_OF_RESOURCES")), ("build", KernelError("it has no compiler"))],
+    ids=repr,
+)
+def test_one_that_cannot_begin_is_left_out(
+    device: Device, caplog: pytest.LogCaptureFixture, call: str, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Whatever its driver says while buffers or programs are made; alone it is an error of clrt's."""
     make, refused = vars(scene_on_device)[call], list[bool]()
 

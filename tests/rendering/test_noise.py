@@ -24,27 +24,38 @@ from .pictures import box, quad
 pytestmark = pytest.mark.statistics
 
 FLOOR = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(0.6, 0.5, 0.4)))
-BALLS = [Sphere(center=(0.0, 1.0, 0.0), material=Diffuse(color=(0.7, 0.2, 0.2))),
-         Sphere(center=(-2.0, 0.7, 1.0), radius=0.7, material=MetallicRoughness(metallic=1.0, roughness=0.3))]
+BALLS = [
+    Sphere(center=(0.0, 1.0, 0.0), material=Diffuse(color=(0.7, 0.2, 0.2))),
+    Sphere(center=(-2.0, 0.7, 1.0), radius=0.7, material=MetallicRoughness(metallic=1.0, roughness=0.3)),
+]
 
 
 def room() -> Scene:
     """Return a closed room with a light at the ceiling and two spheres."""
     lamp = quad([(-1, 3.9, -1), (1, 3.9, -1), (1, 3.9, 1), (-1, 3.9, 1)], Diffuse(emission=(8.0, 7.0, 5.0)))
-    return Scene(meshes=[box(4.0, Diffuse(color=(0.7,) * 3)), FLOOR, lamp], spheres=BALLS,
-                 camera=Camera(position=(0.0, 2.0, 3.9), look_at=(0.0, 1.0, 0.0), fov_degrees=60))
+    return Scene(
+        meshes=[box(4.0, Diffuse(color=(0.7,) * 3)), FLOOR, lamp],
+        spheres=BALLS,
+        camera=Camera(position=(0.0, 2.0, 3.9), look_at=(0.0, 1.0, 0.0), fov_degrees=60),
+    )
 
 
 def outdoors() -> Scene:
     """Return the spheres below an environment map with a small sun."""
     image = np.full((16, 32, 3), 0.4, np.float32)
     image[4, 5] = 150.0
-    return Scene(meshes=[FLOOR], spheres=BALLS, environment=Environment(image=image),
-                 camera=Camera(position=(0.0, 2.0, 6.0), look_at=(0.0, 1.0, 0.0)))
+    return Scene(
+        meshes=[FLOOR],
+        spheres=BALLS,
+        environment=Environment(image=image),
+        camera=Camera(position=(0.0, 2.0, 6.0), look_at=(0.0, 1.0, 0.0)),
+    )
 
 
-@pytest.mark.parametrize("make, sampler, highest", [(room, "sobol", 1.5), (room, "independent", 1.5),
-                                                    (room, "stratified", 2.5), (outdoors, "sobol", 1.5)])
+@pytest.mark.parametrize(
+    "make, sampler, highest",
+    [(room, "sobol", 1.5), (room, "independent", 1.5), (room, "stratified", 2.5), (outdoors, "sobol", 1.5)],
+)
 def test_noise_is_the_error(device: Device, make: Callable[[], Scene], sampler: Sampler, highest: float) -> None:
     """The estimated √relMSE is within a factor of 1.2 for three of four images, tested with 30, and of 1.5 for all.
 
@@ -59,7 +70,7 @@ def test_noise_is_the_error(device: Device, make: Callable[[], Scene], sampler: 
         for spp in (8, 16, 24, 32, 64):
             state = list(renderer.passes(spp=spp))[-1]
             assert state.noise is not None
-            told.append(state.noise / np.sqrt(np.mean((state.film.mean - truth)**2 / (truth**2 + RELATIVE_FLOOR))))
+            told.append(state.noise / np.sqrt(np.mean((state.film.mean - truth) ** 2 / (truth**2 + RELATIVE_FLOOR))))
     assert 1 / 1.5 < min(told) and max(told) < highest
     close = int(np.sum(np.abs(np.log(told)) < np.log(1.2)))
     assert sampler == "stratified" or binomtest(close, len(told), 0.75, alternative="less").pvalue > 1e-3
@@ -92,8 +103,10 @@ def test_a_percentile_of_tiles_ends_a_render(device: Device) -> None:
     """The fewer tiles must reach the requested error, the sooner it stops; they reach it by estimate and in truth."""
     scene, index, size = outdoors(), device.info.index, (64, 64)
     truth = list(Renderer(scene, device=index, size=size, seed=1, spp=1024).passes(spp=1024))[-1].film.mean
-    states = {percent: list(Renderer(scene, device=index, size=size, error_percentile=percent).passes(error=0.1))[-1]
-              for percent in (50, 90, 100)}
+    states = {
+        percent: list(Renderer(scene, device=index, size=size, error_percentile=percent).passes(error=0.1))[-1]
+        for percent in (50, 90, 100)
+    }
     assert states[50].spp < states[90].spp < states[100].spp
     for percent, state in states.items():
         errors = tile_sums((state.film.mean - truth) ** 2 / (truth**2 + RELATIVE_FLOOR)) / (3 * 64)

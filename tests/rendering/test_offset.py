@@ -73,8 +73,8 @@ def test_sphere(device: Device, offset: float, radius: float) -> None:
 
 
 def plane_departures(device: Device, offset: str, shift: float, size: float) -> tuple[Doubles, Doubles, float]:
-    """Return probe_leave's output for a tilted triangle of about `size`, `shift` from the origin; its sides; the unit.
-    """
+    """Return probe_leave's output for a tilted triangle of about `size`, `shift` from the origin; its sides; the
+    unit."""
     n = np.array([0.5, 0.7, -0.3]) / np.linalg.norm([0.5, 0.7, -0.3])
     s = np.cross(n, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(n, [0.0, 0.0, 1.0]))
     corners = (shift + size * np.array([s, np.cross(n, s), -s - np.cross(n, s)])).astype(np.float32)
@@ -98,7 +98,7 @@ def test_far_away_a_fixed_distance_is_not_enough(device: Device, offset: str, sh
         assert met > 0.1
         return
     assert met == 0
-    if shift == 0:   # with coordinates small enough to tell, origins are on the side that rays leave to
+    if shift == 0:  # with coordinates small enough to tell, origins are on the side that rays leave to
         assert np.all(np.sum((out[:, 10:13] - out[:, 1:4]) * side, axis=1)[hit] > 0)
 
 

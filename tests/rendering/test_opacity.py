@@ -39,8 +39,12 @@ def lamp(red: float, green: float, blue: float) -> Diffuse:
 def seen(device: Device, *meshes: Mesh, lanes: Lanes | None = None, spp: int = SPP, **rest: Any) -> NDArray[np.float64]:
     """Return the image (16, 16, 3) of [-1, 1]² from far above."""
     angle = float(np.degrees(2 * np.arctan(1 / 1000)))
-    scene = Scene(meshes=list(meshes), camera=Camera(position=(0, 0, 1000), look_at=(0, 0, 0), fov_degrees=angle),
-                  render=RenderSettings(size=(16, 16), max_depth=2), **rest)
+    scene = Scene(
+        meshes=list(meshes),
+        camera=Camera(position=(0, 0, 1000), look_at=(0, 0, 0), fov_degrees=angle),
+        render=RenderSettings(size=(16, 16), max_depth=2),
+        **rest,
+    )
     for state in Renderer(scene, spp=spp, device=device.info.index, lanes=lanes).passes(spp=spp):
         pass
     return state.film.mean
@@ -51,8 +55,10 @@ def test_layers_show_what_is_behind_as_far_as_they_are_clear(device: Device) -> 
     Each sample sees one layer.
     """
     opacities = [0.25, 0.5, 0.75]
-    veils = [quad(replace(lamp(*(16.0 * row for row in np.eye(3)[i])), opacity=opacity), 3.0 - i)
-             for i, opacity in enumerate(opacities)]
+    veils = [
+        quad(replace(lamp(*(16.0 * row for row in np.eye(3)[i])), opacity=opacity), 3.0 - i)
+        for i, opacity in enumerate(opacities)
+    ]
     found = seen(device, *veils, quad(lamp(16, 16, 16)))
     left = np.cumprod([1, *(1 - opacity for opacity in opacities)])
     chances = [*(left[:-1] * opacities), left[-1]]
@@ -61,7 +67,7 @@ def test_layers_show_what_is_behind_as_far_as_they_are_clear(device: Device) -> 
     for channel in range(3):
         assert found[..., channel].mean() == pytest.approx(16 * chances[channel] + bottom, rel=0.02)
     seen_layers = [found[..., channel].sum() * SPP / 16 for channel in range(3)]
-    whole = (sum(seen_layers) - count) / 2                      # samples of the bottom count in all three channels
+    whole = (sum(seen_layers) - count) / 2  # samples of the bottom count in all three channels
     counts = [*(layer - whole for layer in seen_layers), whole]
     assert np.abs(np.array(counts) - np.round(counts)).max() < 0.05
     # Low-discrepancy samples scatter less than the test expects: only too much scatter would be wrong.
@@ -94,12 +100,16 @@ def test_a_picture_cuts_holes(device: Device) -> None:
     assert found[:, :8, 0].max() == 0 and found[:, 8:, 0].min() == 1
 
 
-@pytest.mark.parametrize("other", [Diffuse(), Diffuse(opacity=0.5), Mirror(opacity=0.5), Mirror(one_sided=True)],
-                         ids=["diffuse", "clear diffuse", "clear mirror", "one-sided mirror"])
+@pytest.mark.parametrize(
+    "other",
+    [Diffuse(), Diffuse(opacity=0.5), Mirror(opacity=0.5), Mirror(one_sided=True)],
+    ids=["diffuse", "clear diffuse", "clear mirror", "one-sided mirror"],
+)
 @pytest.mark.parametrize("one_sided", [False, True])
 @pytest.mark.parametrize("cutoff", [None, 0.5])
-def test_opaque_materials_stop_all_light(device: Device, other: Material, one_sided: bool,
-                                         cutoff: float | None) -> None:
+def test_opaque_materials_stop_all_light(
+    device: Device, other: Material, one_sided: bool, cutoff: float | None
+) -> None:
     """For any alpha of vertex colours, and any other materials in the scene."""
     fading = np.ones((4, 4), np.float32)
     fading[:, 3] = UV[:, 0]
@@ -122,7 +132,7 @@ def test_shadows_of_veils(device: Device, lanes: Lanes) -> None:
         assert found == pytest.approx(expected * passes, rel=1e-5)
     ball = Sphere(center=(-50, 0, 50), radius=5, material=Diffuse(opacity=0.5))
     found = seen(device, ground, lanes=lanes, lights=[sun], spheres=[ball])
-    assert found == pytest.approx(expected * 0.25, rel=1e-5)    # in and out
+    assert found == pytest.approx(expected * 0.25, rel=1e-5)  # in and out
 
 
 def test_a_clear_lamp_gives_less_light(device: Device) -> None:
@@ -130,8 +140,10 @@ def test_a_clear_lamp_gives_less_light(device: Device) -> None:
     down = QUAD[[0, 3, 2, 1]] * (3, 3, 0) + (0, 0, 1)
     ground = quad(Diffuse(color=(0.8, 0.8, 0.8)))
     pictures = []
-    for material in (Diffuse(color=BLACK, emission=(4.0, 4.0, 4.0), opacity=0.5, one_sided=True),
-                     Diffuse(color=BLACK, emission=(2.0, 2.0, 2.0), one_sided=True)):
+    for material in (
+        Diffuse(color=BLACK, emission=(4.0, 4.0, 4.0), opacity=0.5, one_sided=True),
+        Diffuse(color=BLACK, emission=(2.0, 2.0, 2.0), one_sided=True),
+    ):
         pictures.append(seen(device, ground, Mesh(down.astype(np.float32), FACES, material), spp=1024))
     assert pictures[1].mean() > 0.5
     assert np.mean(pictures[0]) == pytest.approx(np.mean(pictures[1]), rel=5e-3)

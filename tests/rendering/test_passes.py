@@ -18,9 +18,30 @@ from clrt.scene.lights import PointLight
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 
 #: Fields that other programs read; the command line adds total_seconds.
-REPORT = {"scene", "device", "platform", "driver", "version", "width", "height", "spp", "max_depth", "seed",
-          "seconds", "samples", "samples_per_second", "rays", "rays_per_second", "stop_reason", "noise",
-          "nonfinite_samples", "bvh", "kernel", "peak_device_bytes", "history"}
+REPORT = {
+    "scene",
+    "device",
+    "platform",
+    "driver",
+    "version",
+    "width",
+    "height",
+    "spp",
+    "max_depth",
+    "seed",
+    "seconds",
+    "samples",
+    "samples_per_second",
+    "rays",
+    "rays_per_second",
+    "stop_reason",
+    "noise",
+    "nonfinite_samples",
+    "bvh",
+    "kernel",
+    "peak_device_bytes",
+    "history",
+}
 BVH = {"triangles", "spheres", "instances", "nodes", "bytes", "build_seconds", "sah_cost", "layout"}
 KERNEL = {"build_seconds", "cached", "features"}
 
@@ -28,10 +49,14 @@ KERNEL = {"build_seconds", "cached", "features"}
 @pytest.fixture
 def renderer(device: Device) -> Renderer:
     """Return a renderer of a point light above a sphere under a sky: noisy and fast."""
-    scene = Scene(spheres=[Sphere(), Sphere(center=(0.0, -101.0, 0.0), radius=100.0)], name="ball",
-                  lights=[PointLight(position=(2.0, 3.0, 2.0), intensity=(20.0, 20.0, 20.0))],
-                  environment=Environment(color=(0.5, 0.5, 0.5)), camera=Camera(position=(0.0, 1.0, 6.0)),
-                  render=RenderSettings(size=(40, 30), spp=12, max_depth=4, seed=6))
+    scene = Scene(
+        spheres=[Sphere(), Sphere(center=(0.0, -101.0, 0.0), radius=100.0)],
+        name="ball",
+        lights=[PointLight(position=(2.0, 3.0, 2.0), intensity=(20.0, 20.0, 20.0))],
+        environment=Environment(color=(0.5, 0.5, 0.5)),
+        camera=Camera(position=(0.0, 1.0, 6.0)),
+        render=RenderSettings(size=(40, 30), spp=12, max_depth=4, seed=6),
+    )
     return Renderer(scene, device=device.info.index)
 
 
@@ -74,27 +99,49 @@ def test_stops_at_an_error(renderer: Renderer) -> None:
     assert all(noise is None or noise > 0.02 for noise in before)
 
 
-@pytest.mark.parametrize(("stops", "reason"), [({"spp": 4, "time": 1000.0, "error": 1e-9}, "spp"),
-                                               ({"spp": 1 << 20, "time": 1000.0, "error": 0.05}, "error"),
-                                               ({"spp": 1 << 30, "time": 0.1, "error": 1e-9}, "time")])
+@pytest.mark.parametrize(
+    ("stops", "reason"),
+    [
+        ({"spp": 4, "time": 1000.0, "error": 1e-9}, "spp"),
+        ({"spp": 1 << 20, "time": 1000.0, "error": 0.05}, "error"),
+        ({"spp": 1 << 30, "time": 0.1, "error": 1e-9}, "time"),
+    ],
+)
 def test_the_first_condition_met_ends_it(renderer: Renderer, stops: dict[str, float], reason: str) -> None:
     for _ in renderer.passes(**stops):  # type: ignore[arg-type]
         pass
     assert renderer.stop_reason == reason
 
 
-@pytest.mark.parametrize("stops", [{"spp": 0}, {"time": -1.0}, {"error": float("nan")}, {"time": float("inf")},
-                                   {"spp": "4"}, {"spp": 1.5}, {"spp": True}, {"time": "1"}, {"error": [0.1]}],
-                         ids=str)
+@pytest.mark.parametrize(
+    "stops",
+    [
+        {"spp": 0},
+        {"time": -1.0},
+        {"error": float("nan")},
+        {"time": float("inf")},
+        {"spp": "4"},
+        {"spp": 1.5},
+        {"spp": True},
+        {"time": "1"},
+        {"error": [0.1]},
+    ],
+    ids=str,
+)
 def test_impossible_conditions_are_refused(renderer: Renderer, stops: dict[str, Any]) -> None:
     with pytest.raises(UsageError, match=next(iter(stops))):
         next(renderer.passes(**stops))
 
 
-@pytest.mark.parametrize("reference, said", [
-    (np.zeros((4, 4, 3)), "of shape \\(4, 4, 3\\); give a numpy array of the image's shape, \\(30, 40, 3\\)"),
-    ("full.exr", "read it with clrt.read_image"), (np.full((30, 40, 3), "1"), "give real numbers"),
-    (np.where(np.arange(3600).reshape(30, 40, 3) < 5, [np.nan, np.inf, 1], 1), "NaN or infinite \\(2 of 1200\\)")])
+@pytest.mark.parametrize(
+    "reference, said",
+    [
+        (np.zeros((4, 4, 3)), "of shape \\(4, 4, 3\\); give a numpy array of the image's shape, \\(30, 40, 3\\)"),
+        ("full.exr", "read it with clrt.read_image"),
+        (np.full((30, 40, 3), "1"), "give real numbers"),
+        (np.where(np.arange(3600).reshape(30, 40, 3) < 5, [np.nan, np.inf, 1], 1), "NaN or infinite \\(2 of 1200\\)"),
+    ],
+)
 def test_what_is_no_reference_is_refused(renderer: Renderer, reference: Any, said: str) -> None:
     with pytest.raises(UsageError, match=said):
         next(renderer.passes(spp=1, reference=reference))
@@ -107,6 +154,7 @@ def test_what_was_planned_is_where_it_ends(renderer: Renderer, device: Device) -
 
 def test_launches_run_while_a_state_is_made(renderer: Renderer) -> None:
     """Except after the last one, and if an error is a stop condition."""
+
     def ahead(state: State) -> bool:
         return bool(renderer.session.work.parts) or renderer.session.samples_done > state.spp
 
@@ -137,18 +185,33 @@ def test_two_that_take_turns(renderer: Renderer, other: int, rest: list[int]) ->
     assert [state.spp for state in first if state.spp & (state.spp - 1) == 0 or state.spp == 12] == rest
 
 
-@pytest.mark.parametrize("chosen", [{"layout": "octree"}, {"lanes": 3}, {"triangle": "square"}, {"builder": "hope"},
-                                    {"spp": "4"}, {"spp": 1.5}, {"tree": "off"}],
-                         ids=str)
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        {"layout": "octree"},
+        {"lanes": 3},
+        {"triangle": "square"},
+        {"builder": "hope"},
+        {"spp": "4"},
+        {"spp": 1.5},
+        {"tree": "off"},
+    ],
+    ids=str,
+)
 def test_unknown_choices_are_refused(device: Device, chosen: dict[str, object]) -> None:
     with pytest.raises(UsageError, match=next(iter(chosen))):
         Renderer(Scene(), device=device.info.index, **chosen)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("scene", "words"), [
-    ("scenes/cornell.toml", "scene is the path 'scenes/cornell.toml'; read it with clrt.load"),
-    (Path("a.glb"), "scene is the path 'a.glb'; read it with clrt.load"),
-    (Camera(), "scene is a Camera; give a clrt.Scene")], ids=str)
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ("scenes/cornell.toml", "scene is the path 'scenes/cornell.toml'; read it with clrt.load"),
+        (Path("a.glb"), "scene is the path 'a.glb'; read it with clrt.load"),
+        (Camera(), "scene is a Camera; give a clrt.Scene"),
+    ],
+    ids=str,
+)
 def test_what_is_no_scene_is_refused(scene: Any, words: str) -> None:
     with pytest.raises(UsageError, match=words):
         Renderer(scene)
@@ -163,7 +226,7 @@ def test_relmse_against_a_reference(renderer: Renderer) -> None:
     """mean((x − r)²/(r² + 0.01)), in the state and in the history."""
     reference = np.random.default_rng(0).random((30, 40, 3)).astype(np.float32)
     last = list(renderer.passes(spp=4, reference=reference))[-1]
-    expected = np.mean((last.pixels.astype(float) - reference)**2 / (reference.astype(float)**2 + 0.01))
+    expected = np.mean((last.pixels.astype(float) - reference) ** 2 / (reference.astype(float) ** 2 + 0.01))
     assert last.relmse == pytest.approx(expected, rel=1e-6)
     assert renderer.history[-1]["relmse"] == last.relmse
 
@@ -187,6 +250,8 @@ def test_report(renderer: Renderer) -> None:
 
 def test_direct_is_two_edges(renderer: Renderer, device: Device) -> None:
     """The integrator "direct" is the path tracer of depth 2."""
-    direct, shallow = (list(Renderer(renderer.scene, device=device.info.index, **given).passes(spp=4))[-1].pixels
-                       for given in ({"integrator": "direct"}, {"max_depth": 2}))
+    direct, shallow = (
+        list(Renderer(renderer.scene, device=device.info.index, **given).passes(spp=4))[-1].pixels
+        for given in ({"integrator": "direct"}, {"max_depth": 2})
+    )
     assert np.array_equal(direct, shallow)

@@ -21,8 +21,10 @@ LAMP = Diffuse(emission=(4.0, 4.0, 4.0))
 BALL = Scene(spheres=[Sphere()], lights=[PointLight(position=(0, 4, 4), intensity=(9, 9, 9))], name="ball")
 UPWARDS = quad([(-1, 3, 1), (1, 3, 1), (1, 3, -1), (-1, 3, -1)], LAMP)
 DEBUG = "; `clrt debug SCENE --pixel 4,3` shows why"
-DROPPED = ("were not finite and were dropped, so the image may be too dark; look for extreme values in lights, "
-           "textures and materials")
+DROPPED = (
+    "were not finite and were dropped, so the image may be too dark; look for extreme values in lights, "
+    "textures and materials"
+)
 
 
 def said(device: Device, caplog: pytest.LogCaptureFixture, scene: Scene, **options: Any) -> list[str]:
@@ -39,16 +41,31 @@ def test_a_picture_that_is_right_says_nothing(device: Device, caplog: pytest.Log
         assert said(device, caplog, BALL, integrator=integrator) == []
 
 
-@pytest.mark.parametrize("scene, options, reason", [
-    (replace(BALL, camera=Camera(position=(0, 0, 5), look_at=(0, 0, 9))), {},
-     "camera rays hit nothing, or only surfaces that reflect nothing"),
-    (replace(BALL, lights=[PointLight(position=(0, 0, 0), intensity=(9, 9, 9))]), {},
-     "no light reaches what the camera sees"),
-    (BALL, {"max_depth": 1}, "max_depth is 1, which shows emission alone, and the camera sees no emitter"),
-    (replace(BALL, lights=[], environment=Environment(color=(2.0**-15,) * 3), spheres=[]), {},
-     "its brightest value is 3.1e-05; --exposure 14 makes it visible")], ids=["away", "shadow", "depth", "dim"])
-def test_a_black_picture_says_why(device: Device, caplog: pytest.LogCaptureFixture, scene: Scene,
-                                  options: dict[str, Any], reason: str) -> None:
+@pytest.mark.parametrize(
+    "scene, options, reason",
+    [
+        (
+            replace(BALL, camera=Camera(position=(0, 0, 5), look_at=(0, 0, 9))),
+            {},
+            "camera rays hit nothing, or only surfaces that reflect nothing",
+        ),
+        (
+            replace(BALL, lights=[PointLight(position=(0, 0, 0), intensity=(9, 9, 9))]),
+            {},
+            "no light reaches what the camera sees",
+        ),
+        (BALL, {"max_depth": 1}, "max_depth is 1, which shows emission alone, and the camera sees no emitter"),
+        (
+            replace(BALL, lights=[], environment=Environment(color=(2.0**-15,) * 3), spheres=[]),
+            {},
+            "its brightest value is 3.1e-05; --exposure 14 makes it visible",
+        ),
+    ],
+    ids=["away", "shadow", "depth", "dim"],
+)
+def test_a_black_picture_says_why(
+    device: Device, caplog: pytest.LogCaptureFixture, scene: Scene, options: dict[str, Any], reason: str
+) -> None:
     assert said(device, caplog, scene, **options) == [f"the image is black: {reason}{DEBUG}"]
     assert said(device, caplog, scene, integrator="depth") == []
 
@@ -59,7 +76,8 @@ def test_a_lamp_that_is_wound_backwards(device: Device, caplog: pytest.LogCaptur
     found = said(device, caplog, scene)
     assert [text.split(";")[0] for text in found] == [
         'the emissive mesh "mesh" emits light only away from the scene',
-        'the image is black: "mesh" emits light only away from the scene']
+        'the image is black: "mesh" emits light only away from the scene',
+    ]
     assert said(device, caplog, replace(scene, lights=BALL.lights))[1:] == []
     turned = replace(UPWARDS, faces=UPWARDS.faces[:, ::-1].copy())
     assert said(device, caplog, replace(scene, meshes=[turned])) == []
@@ -76,14 +94,18 @@ def test_samples_that_are_not_finite(device: Device, caplog: pytest.LogCaptureFi
     """
     sky = np.ones((2, 4, 3), np.float32)
     sky[0, 0] = 1e35
-    some = said(device, caplog, Scene(environment=Environment(image=sky), name="sky",
-                                      camera=Camera(projection="equirectangular")))
+    some = said(
+        device,
+        caplog,
+        Scene(environment=Environment(image=sky), name="sky", camera=Camera(projection="equirectangular")),
+    )
     assert len(some) == 1 and some[0].endswith(DROPPED)
     dropped, samples = (int(word) for word in some[0].split() if word.isdigit())
     assert 0 < dropped < samples == 8 * 6 * 4
     assert said(device, caplog, Scene(environment=Environment(color=(1e35, 1.0, 1.0)), name="sky")) == [
         f"192 of 192 samples {DROPPED}",
-        f"the image is black: none of its samples is finite{DEBUG}"]
+        f"the image is black: none of its samples is finite{DEBUG}",
+    ]
 
 
 def test_a_scene_without_light_says_so_once(device: Device, caplog: pytest.LogCaptureFixture) -> None:

@@ -20,7 +20,7 @@ WEIGHTS = {
     "ends in zeros": np.array([0.0, 0.0, 1.0, 2.0, 0.0, 0.0]),
     "peak": np.where(np.arange(2000) == 777, 1e6, 1.0),
     "tiny": np.where(np.arange(5) == 2, 1e-12, 1.0),
-    "rows": RNG.random((5, 300))**8,
+    "rows": RNG.random((5, 300)) ** 8,
     "bands": RNG.random((90, 1024)),
 }
 
@@ -49,7 +49,7 @@ def test_searches_start_in_time(weights: NDArray[np.float64]) -> None:
     """At or before the step that contains u, with u·n a float32 product, and on average hardly before it."""
     table, _ = table_of(weights)
     n = table.shape[1]
-    edges = np.round(np.arange(n) / n * LEVELS)[:, None] + np.arange(-2, 3)    # where that product may be rounded up
+    edges = np.round(np.arange(n) / n * LEVELS)[:, None] + np.arange(-2, 3)  # where that product may be rounded up
     levels = np.concatenate([edges.ravel(), RNG.integers(0, LEVELS, 1 << 16), [0, LEVELS - 1]])
     u = (levels[(levels >= 0) & (levels < LEVELS)] / LEVELS).astype(np.float32)
     cell = (u * np.float32(n)).astype(int)

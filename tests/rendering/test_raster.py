@@ -51,8 +51,9 @@ def with_rubbish(mesh: Mesh) -> Mesh:
     """Add triangles without area: points, lines, and one that the camera at the origin sees edge-on."""
     bad = np.array([[[0, 0, -1]] * 3, [[-1, 0, -1], [1, 0, -1], [0, 0, -1]], [[-1, 0, -1], [1, 0, -1], [0, 0, -2]]])
     faces = np.arange(9, dtype=np.int32).reshape(3, 3) + np.int32(len(mesh.vertices))
-    return Mesh(np.concatenate([mesh.vertices, bad.reshape(-1, 3)]).astype(np.float32),
-                np.concatenate([mesh.faces, faces]))
+    return Mesh(
+        np.concatenate([mesh.vertices, bad.reshape(-1, 3)]).astype(np.float32), np.concatenate([mesh.faces, faces])
+    )
 
 
 def plain(half: float, below: float) -> Mesh:
@@ -71,7 +72,8 @@ SIGHTS: dict[str, tuple[Mesh, Camera]] = {
     "a room": (box(2.0, Diffuse()), AHEAD),
     "a floor of many": (Mesh(grid(40)[0] - np.array([20.3, 0.7, 20.2], np.float32), grid(40)[1]), AHEAD),
     "slivers": (ball(3, (0.0, 0.0, -3.0), stretch=1e-4), replace(AHEAD, position=(0.0, 0.01, 0.0), look_at=(0, 0, -3))),
-    "without an area": (with_rubbish(ball(2, (0.0, 0.0, -4.0))), AHEAD)}
+    "without an area": (with_rubbish(ball(2, (0.0, 0.0, -4.0))), AHEAD),
+}
 
 
 @cache
@@ -87,8 +89,14 @@ def exactly_seen(name: str, *places: bytes) -> tuple[Doubles, NDArray[np.int64],
     return t * np.linalg.norm(directions, axis=1), np.flatnonzero(areas > 0)[triangle], margin
 
 
-@pytest.mark.parametrize("name, lanes", [*((name, 8) for name in SIGHTS), ("through the eye's plane", 1), *others(
-    ("5120 triangles", 1), ("5120 triangles", 16), ("through the eye's plane", 16))])
+@pytest.mark.parametrize(
+    "name, lanes",
+    [
+        *((name, 8) for name in SIGHTS),
+        ("through the eye's plane", 1),
+        *others(("5120 triangles", 1), ("5120 triangles", 16), ("through the eye's plane", 16)),
+    ],
+)
 def test_what_is_seen_first_is_what_float64_says(device: Device, name: str, lanes: int) -> None:
     """First hits agree wherever they do not depend on rounding."""
     mesh, camera = SIGHTS[name]
@@ -128,12 +136,17 @@ def test_of_equals_the_first_is_seen(device: Device) -> None:
     assert seen["primitive"].max() < len(mesh.faces) and np.any(seen["primitive"] >= 0)
 
 
-@pytest.mark.parametrize("spheres", [
-    [Sphere(center=(x, y, -6.0), radius=0.3) for x in (-2.0, 0.0, 2.0) for y in (-2.0, 0.0, 2.0)],
-    [Sphere(center=(0.0, 0.1, 0.0), radius=5.0)], [Sphere(center=(0.0, -1e5, 0.0), radius=1e5 - 1)],
-    [Sphere(center=(0.0, -20.0, -120.0), radius=0.9), Sphere(center=(-1.0, 0.0, -0.2), radius=0.9)],
-    *others([Sphere(center=(0.3 * i - 3, np.sin(i), -4 - 0.1 * i), radius=0.2) for i in range(40)]),
-], ids=["few", "around the eye", "ground", "far and beside", "many"])
+@pytest.mark.parametrize(
+    "spheres",
+    [
+        [Sphere(center=(x, y, -6.0), radius=0.3) for x in (-2.0, 0.0, 2.0) for y in (-2.0, 0.0, 2.0)],
+        [Sphere(center=(0.0, 0.1, 0.0), radius=5.0)],
+        [Sphere(center=(0.0, -1e5, 0.0), radius=1e5 - 1)],
+        [Sphere(center=(0.0, -20.0, -120.0), radius=0.9), Sphere(center=(-1.0, 0.0, -0.2), radius=0.9)],
+        *others([Sphere(center=(0.3 * i - 3, np.sin(i), -4 - 0.1 * i), radius=0.2) for i in range(40)]),
+    ],
+    ids=["few", "around the eye", "ground", "far and beside", "many"],
+)
 def test_spheres_are_seen_as_rays_meet_them(device: Device, spheres: list[Sphere]) -> None:
     """The same test of the same ray is used: results are equal except for the side of a silhouette."""
     scene = Scene(spheres=spheres, meshes=[soup(20, 4)], camera=AHEAD, render=replace(SETTINGS, size=(128, 96)))
@@ -159,8 +172,8 @@ def corners_of(device: Device, scene: Scene, seen: NDArray[Any]) -> Doubles:
 
 
 def to_edges(corners: Doubles, camera: Camera, size: tuple[int, int], seen: NDArray[Any]) -> Doubles:
-    """Return the distance in pixels (n,) from the points of SEEN records to the nearest edge line of their triangles.
-    """
+    """Return the distance in pixels (n,) from the points of SEEN records to the nearest edge line of their
+    triangles."""
     forward, right, up, extent = frame(camera)
     across, down = extent * size[0] / size[1] * right, -extent * up
     p = corners - camera.position
@@ -172,12 +185,17 @@ def to_edges(corners: Doubles, camera: Camera, size: tuple[int, int], seen: NDAr
 
 def bare(scene: Scene) -> Scene:
     """Return only the scene's shapes, with one material, so that most scenes share a program."""
-    meshes = {id(mesh): Mesh(mesh.vertices, mesh.faces) for mesh in
-              [*scene.meshes, *(instance.mesh for instance in scene.instances)]}
-    return Scene(meshes=[meshes[id(mesh)] for mesh in scene.meshes],
-                 instances=[Instance(meshes[id(instance.mesh)], instance.to_world) for instance in scene.instances],
-                 spheres=[Sphere(center=ball.center, radius=ball.radius) for ball in scene.spheres],
-                 camera=scene.camera, render=scene.render)
+    meshes = {
+        id(mesh): Mesh(mesh.vertices, mesh.faces)
+        for mesh in [*scene.meshes, *(instance.mesh for instance in scene.instances)]
+    }
+    return Scene(
+        meshes=[meshes[id(mesh)] for mesh in scene.meshes],
+        instances=[Instance(meshes[id(instance.mesh)], instance.to_world) for instance in scene.instances],
+        spheres=[Sphere(center=ball.center, radius=ball.radius) for ball in scene.spheres],
+        camera=scene.camera,
+        render=scene.render,
+    )
 
 
 @pytest.mark.parametrize("name", [*(name for name in GALLERY if name != "instances"), *others("instances")])
@@ -191,8 +209,10 @@ def test_the_gallery_is_seen_as_rays_see_it(device: Device, name: str) -> None:
     other = (seen["primitive"] != traced["primitive"]) | (seen["instance"] != traced["instance"])
     assert np.mean(other) < (0.02 if name == "instances" else 1e-3)
     if other.any():
-        near = [np.where(each["primitive"] < 0, np.inf, to_edges(corners_of(device, scene, each), camera, size, each))
-                for each in (seen[other], traced[other])]
+        near = [
+            np.where(each["primitive"] < 0, np.inf, to_edges(corners_of(device, scene, each), camera, size, each))
+            for each in (seen[other], traced[other])
+        ]
         assert np.max(np.minimum(*near)) < 0.01
 
 
@@ -206,10 +226,12 @@ PLANTED = planted(painted(BELL))
 
 @pytest.mark.parametrize("scene, lanes", [(PLANTED, 8), *others((BELL, 1))], ids=["planted, 8", "wide filter, 1"])
 def test_pictures_are_those_of_local(device: Device, scene: Scene, lanes: int) -> None:
-    """They agree sample by sample except at edges; mirrors, glass, alpha masks, textures and shadows use the first hit.
-    """
-    one, other = (film(device, replace(scene, render=replace(scene.render, integrator=integrator)), lanes=lanes).mean
-                  for integrator in ("raster", "local"))
+    """They agree sample by sample except at edges; mirrors, glass, alpha masks, textures and shadows use the first
+    hit."""
+    one, other = (
+        film(device, replace(scene, render=replace(scene.render, integrator=integrator)), lanes=lanes).mean
+        for integrator in ("raster", "local")
+    )
     assert differing(one, other) < 0.01 and one.std() > 0.1
 
 
@@ -222,8 +244,14 @@ def test_without_shadows_all_that_faces_a_light_is_lit(device: Device, integrato
     camera = Camera(position=(0.0, 1.0, 0.0), look_at=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), fov_degrees=100)
     ground = replace(plain(50.0, 0.0), material=Diffuse(color=red))
     settings = replace(SETTINGS, integrator=integrator, shadows=False)
-    scene = Scene(meshes=[ground], spheres=[shade], lights=[sun], camera=camera, environment=Environment(color=sky),
-                  render=settings)
+    scene = Scene(
+        meshes=[ground],
+        spheres=[shade],
+        lights=[sun],
+        camera=camera,
+        environment=Environment(color=sky),
+        render=settings,
+    )
     lit = np.broadcast_to(np.multiply(red, np.add(sky, 1)), (*SIZE[::-1], 3))
     np.testing.assert_allclose(film(device, scene).mean, lit, rtol=1e-5)
     if integrator == "raster":
@@ -235,8 +263,12 @@ def test_mirrors_end_with_the_depth(device: Device) -> None:
     """At depth 2 a mirror shows the sky and emitters; at higher depths, what it reflects."""
     mirror = quad([(-2, -2, -2), (2, -2, -2), (2, 2, -2), (-2, 2, -2)], Mirror(color=(0.5,) * 3))
     behind = quad([(-9, -9, 3), (9, -9, 3), (9, 9, 3), (-9, 9, 3)], Diffuse(color=(0.7,) * 3))
-    scene = Scene(meshes=[mirror, behind], camera=replace(AHEAD, look_at=(0.0, 0.0, -1.0), fov_degrees=20),
-                  environment=Environment(color=(0.6, 0.6, 0.6)), render=SETTINGS)
+    scene = Scene(
+        meshes=[mirror, behind],
+        camera=replace(AHEAD, look_at=(0.0, 0.0, -1.0), fov_degrees=20),
+        environment=Environment(color=(0.6, 0.6, 0.6)),
+        render=SETTINGS,
+    )
     shallow, deep = (film(device, replace(scene, render=replace(SETTINGS, max_depth=depth))).mean for depth in (2, 3))
     assert not shallow.any() and np.allclose(deep, 0.5 * 0.6 * 0.7, rtol=1e-5)
 
@@ -254,13 +286,18 @@ def test_it_follows_a_camera_that_moves(device: Device) -> None:
 
 def test_thousands_of_instances_are_numbered_right(device: Device) -> None:
     vertices, faces = icosphere(3)
-    places = [np.column_stack([np.diag([s, 0.5, -s]) * 0.4, [x, 0.0, -z]]) for s, x, z in
-              ((0.5 + 0.1 * (i % 7), i % 12 - 5.5, 3 + i // 12) for i in range(120))]
+    places = [
+        np.column_stack([np.diag([s, 0.5, -s]) * 0.4, [x, 0.0, -z]])
+        for s, x, z in ((0.5 + 0.1 * (i % 7), i % 12 - 5.5, 3 + i // 12) for i in range(120))
+    ]
     shown = Mesh(vertices, faces)
-    scene = Scene(meshes=[plain(30.0, 1.0)], instances=[Instance(shown, place) for place in places],
-                  camera=Camera(position=(0.0, 4.0, 2.0), look_at=(0.0, 0.0, -6.0), fov_degrees=70),
-                  spheres=[Sphere(center=(0.0, 1.0, -4.0), radius=0.5)],
-                  render=replace(SETTINGS, size=(200, 150)))
+    scene = Scene(
+        meshes=[plain(30.0, 1.0)],
+        instances=[Instance(shown, place) for place in places],
+        camera=Camera(position=(0.0, 4.0, 2.0), look_at=(0.0, 0.0, -6.0), fov_degrees=70),
+        spheres=[Sphere(center=(0.0, 1.0, -4.0), radius=0.5)],
+        render=replace(SETTINGS, size=(200, 150)),
+    )
     seen, traced = seen_both_ways(device, scene)
     assert len(np.unique(traced["instance"])) > 60
     same = (seen["primitive"] == traced["primitive"]) & (seen["instance"] == traced["instance"])

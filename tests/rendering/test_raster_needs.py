@@ -59,9 +59,14 @@ def test_where_no_ray_is_followed_there_is_no_tree(device: Device) -> None:
     """The image is bit-identical to the one with a BVH; first hits of rays remain available on request."""
     balls = [Sphere(center=(-1.5, 0.0, -4.0), radius=0.7), Sphere(center=(1.5, 0.0, -4.0), radius=0.7)]
     sun = DirectionalLight(direction=(-1, -1, 0), irradiance=(1.0, 1.0, 1.0))
-    scene = Scene(meshes=[ball(3, (0.0, 0.0, -3.0)), plain(9.0, 1.0)], spheres=balls, lights=[sun], camera=AHEAD,
-                  environment=Environment(color=(0.1, 0.2, 0.3)),
-                  render=replace(SETTINGS, shadows=False, size=(64, 48)))
+    scene = Scene(
+        meshes=[ball(3, (0.0, 0.0, -3.0)), plain(9.0, 1.0)],
+        spheres=balls,
+        lights=[sun],
+        camera=AHEAD,
+        environment=Environment(color=(0.1, 0.2, 0.3)),
+        render=replace(SETTINGS, shadows=False, size=(64, 48)),
+    )
     asked = Renderer(scene, device=device.info.index, aovs="object")
     renderer = Renderer(scene, device=device.info.index)
     with_tree, without = (list(each.passes(spp=4))[-1] for each in (asked, renderer))
@@ -71,8 +76,10 @@ def test_where_no_ray_is_followed_there_is_no_tree(device: Device) -> None:
     assert set(np.unique(asked.aovs(with_tree)["object"])) == {-1, 0, 1, 2, 3}
     with pytest.raises(UsageError, match="first_hits=True"):
         renderer.session.guides()
-    shaded, local = (replace(scene, render=replace(scene.render, **needed))
-                     for needed in ({"shadows": True}, {"integrator": "local"}))
+    shaded, local = (
+        replace(scene, render=replace(scene.render, **needed))
+        for needed in ({"shadows": True}, {"integrator": "local"})
+    )
     for other, wanted in ((shaded, Choices()), (local, Choices()), (scene, Choices(first_hits=True))):
         assert "IN_TREE" in compile_scene(other, wanted).features
     for material in (Mirror(), Dielectric(), Diffuse(opacity=0.5)):

@@ -48,8 +48,12 @@ def seen_floor(light: Doubles) -> tuple[Doubles, Doubles]:
 
 def test_point_light_on_a_plane(device: Device) -> None:
     """L = albedo/pi · I · cos θ/d²."""
-    scene = Scene(meshes=[FLOOR], lights=[PointLight(position=(1.5, 2.0, -1.0), intensity=(60.0, 58.0, 50.0))],
-                  camera=ABOVE, render=settings(12, 8, 256))
+    scene = Scene(
+        meshes=[FLOOR],
+        lights=[PointLight(position=(1.5, 2.0, -1.0), intensity=(60.0, 58.0, 50.0))],
+        camera=ABOVE,
+        render=settings(12, 8, 256),
+    )
     distance2, cosine = seen_floor(np.array([1.5, 2.0, -1.0]))
     light = (cosine / distance2)[..., None] * ALBEDO / np.pi * [60.0, 58.0, 50.0]
     assert_picture(device, scene, pixel_means(light))
@@ -80,8 +84,12 @@ def test_directional_light_on_a_plane(device: Device) -> None:
 @pytest.mark.parametrize("material", [Diffuse(color=(1.0, 1.0, 1.0)), PAINT, Mirror(color=(0.8, 0.5, 0.2))], ids=str)
 def test_furnace(device: Device, material: Material) -> None:
     """A convex body under a white sky has its albedo in every sample, exactly in float32."""
-    scene = Scene(spheres=[Sphere(material=material)], environment=Environment(color=(1.0, 1.0, 1.0)),
-                  camera=Camera(position=(0.0, 0.0, 3.0), fov_degrees=20), render=settings(16, 16, 33, max_depth=8))
+    scene = Scene(
+        spheres=[Sphere(material=material)],
+        environment=Environment(color=(1.0, 1.0, 1.0)),
+        camera=Camera(position=(0.0, 0.0, 3.0), fov_degrees=20),
+        render=settings(16, 16, 33, max_depth=8),
+    )
     picture = film(device, scene)
     color = np.array(material.parameters()["color"], np.float32)
     assert np.all(picture.mean.astype(np.float32) == color)
@@ -98,8 +106,11 @@ def test_emissive_box(device: Device, depth: int) -> None:
     """
     e = np.array([1.0, 2.0, 0.5])
     walls = box(1.0, Diffuse(color=(0.8, 0.5, 0.2), emission=(1.0, 2.0, 0.5)))
-    scene = Scene(meshes=[walls], camera=Camera(position=(0.1, 0.2, 0.3), look_at=(1.0, 0.5, 0.2), fov_degrees=90),
-                  render=settings(32, 32, 64, max_depth=depth))
+    scene = Scene(
+        meshes=[walls],
+        camera=Camera(position=(0.1, 0.2, 0.3), look_at=(1.0, 0.5, 0.2), fov_degrees=90),
+        render=settings(32, 32, 64, max_depth=depth),
+    )
     expected = e * (1 - ALBEDO**depth) / (1 - ALBEDO)
     mean = film(device, scene).mean.reshape(-1, 3)
     p = mean_test(mean.mean(axis=0), mean.var(axis=0), len(mean), expected)
@@ -110,12 +121,15 @@ def test_emissive_box(device: Device, depth: int) -> None:
 @pytest.mark.parametrize("smith", ["height_correlated", "separable"])
 def test_microfacets_under_a_lamp(device: Device, roughness: float, smith: Smith) -> None:
     """GGX with F = 1 among emissive walls has its single-scattering albedo, with MIS of light and BSDF samples."""
-    metal = MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness, smith=smith,
-                              multiple_scattering=False)
+    metal = MetallicRoughness(
+        color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness, smith=smith, multiple_scattering=False
+    )
     tile = quad([(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], metal)
-    scene = Scene(meshes=[box(30.0, Diffuse(color=BLACK, emission=(1.0, 1.0, 1.0))), tile],
-                  camera=Camera(position=(0.0, 3.0, 4.0), look_at=(0.0, 0.0, 0.0), fov_degrees=0.1),
-                  render=settings(8, 8, 1024))
+    scene = Scene(
+        meshes=[box(30.0, Diffuse(color=BLACK, emission=(1.0, 1.0, 1.0))), tile],
+        camera=Camera(position=(0.0, 3.0, 4.0), look_at=(0.0, 0.0, 0.0), fov_degrees=0.1),
+        render=settings(8, 8, 1024),
+    )
     assert_picture(device, scene, np.full(3, albedo(roughness**2, 0.6, smith)))
 
 
@@ -139,8 +153,9 @@ def test_max_depth_counts_edges(device: Device) -> None:
 def test_size_does_not_matter(device: Device, scale: float) -> None:
     """The emissive box at all scales: e·(1 + a), in pixels that see its walls."""
     walls = box(scale, Diffuse(color=(0.8, 0.5, 0.2), emission=(1.0, 2.0, 0.5)))
-    camera = Camera(position=(0.1 * scale, 0.2 * scale, 0.3 * scale), look_at=(scale, 0.5 * scale, 0.2 * scale),
-                    fov_degrees=90)
+    camera = Camera(
+        position=(0.1 * scale, 0.2 * scale, 0.3 * scale), look_at=(scale, 0.5 * scale, 0.2 * scale), fov_degrees=90
+    )
     scene = Scene(meshes=[walls], camera=camera, render=settings(16, 16, 64))
     assert_picture(device, scene, np.array([1.0, 2.0, 0.5]) * (1 + ALBEDO))
 
@@ -148,8 +163,9 @@ def test_size_does_not_matter(device: Device, scale: float) -> None:
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 1.0, 1e6])
 def test_shadows_at_all_sizes(device: Device, scale: float) -> None:
     """A board halfway between a point light and the floor, and one close to the floor: black below both."""
-    boards = [quad([(x - 1, y, 1), (x + 1, y, 1), (x + 1, y, -1), (x - 1, y, -1)], PAINT)
-              for x, y in ((0, 1), (4, 0.01))]
+    boards = [
+        quad([(x - 1, y, 1), (x + 1, y, 1), (x + 1, y, -1), (x - 1, y, -1)], PAINT) for x, y in ((0, 1), (4, 0.01))
+    ]
     meshes = [replace(mesh, vertices=mesh.vertices * np.float32(scale)) for mesh in (FLOOR, *boards)]
     light = PointLight(position=(0.0, 2 * scale, 0.0), intensity=(scale**2, scale**2, scale**2))
     for x in (0.0, 4.0):

@@ -44,8 +44,14 @@ def plain(hint: Any) -> set[Any]:
     return {type(get_args(part)[0]) if get_origin(part) is Literal else part for part in parts} - {NoneType}
 
 
-@pytest.mark.parametrize("options, kinds", [(PictureOptions, [RenderSettings]), (TracingOptions, [Choices, HitTests]),
-                                            (CheckpointOptions, [CheckpointPolicy])])
+@pytest.mark.parametrize(
+    "options, kinds",
+    [
+        (PictureOptions, [RenderSettings]),
+        (TracingOptions, [Choices, HitTests]),
+        (CheckpointOptions, [CheckpointPolicy]),
+    ],
+)
 def test_keywords_are_the_fields_of_settings(options: type, kinds: list[type]) -> None:
     """By name and type; lists of allowed values are the same."""
     stated, meant = hints_of(options), hints_of(*kinds)
@@ -54,8 +60,9 @@ def test_keywords_are_the_fields_of_settings(options: type, kinds: list[type]) -
         for field in fields(kind):
             if field.name not in NO_KEYWORDS:
                 assert plain(stated[field.name]) == plain(meant[field.name]), field.name
-                literals = [part for part in (stated[field.name], *get_args(stated[field.name]))
-                            if get_origin(part) is Literal]
+                literals = [
+                    part for part in (stated[field.name], *get_args(stated[field.name])) if get_origin(part) is Literal
+                ]
                 values = [*field.metadata["values"]]
                 if values and bool not in plain(stated[field.name]):
                     assert [*get_args(literals[0])] == values, field.name
@@ -66,8 +73,11 @@ def test_keywords_are_listed_and_described(name: str) -> None:
     """In the signature, which editors show, and in the docstring, which help() shows."""
     listed, text = inspect.signature(CALLS[name]).parameters, inspect.getdoc(CALLS[name]) or ""
     assert all(each.kind is not inspect.Parameter.VAR_KEYWORD for each in listed.values())
-    described = {line.split(":")[0].strip("- "): line.split(":", 1)[1].strip()
-                 for line in text.split("Keywords:")[1].splitlines() if ":" in line}
+    described = {
+        line.split(":")[0].strip("- "): line.split(":", 1)[1].strip()
+        for line in text.split("Keywords:")[1].splitlines()
+        if ":" in line
+    }
     for keyword in hints_of(RendererOptions):
         assert listed[keyword].kind is inspect.Parameter.KEYWORD_ONLY and described[keyword]
     assert listed["triangle"].default == "watertight" and listed["checkpoint_seconds"].default == 30.0
@@ -83,13 +93,14 @@ def test_misspelled_keywords_are_refused(name: str, wrong: str, meant: str) -> N
 
 def test_choices_suit_the_device() -> None:
     """What is chosen stays; the rest is the device's. Wavefront paths need 8 lanes that share packets."""
+
     class Fake:
         def __init__(self, lanes: int, packs: bool) -> None:
             self.lanes, self.packs = lanes, packs
 
     def on(width: int, packs: bool, **chosen: Any) -> tuple[int, str]:
-        found = Choices(**chosen).on(Fake(width, packs))   # type: ignore[arg-type]
-        assert found.on(Fake(16, False)) == found          # type: ignore[arg-type]
+        found = Choices(**chosen).on(Fake(width, packs))  # type: ignore[arg-type]
+        assert found.on(Fake(16, False)) == found  # type: ignore[arg-type]
         return found.lanes, found.paths
 
     assert on(8, True) == (8, "waves") and on(8, False) == (8, "lanes") and on(1, True) == (1, "lanes")

@@ -39,12 +39,12 @@ def walter(eta: float, alpha: float, wo: Doubles, wi: Doubles) -> Doubles:
     h = sum_ / np.linalg.norm(sum_, axis=1, keepdims=True)
     h *= np.sign(h[:, 2:])
     cos_o, cos_i = np.sum(wo * h, axis=1), np.sum(wi * h, axis=1)
-    tan2 = (1 - h[:, 2]**2) / h[:, 2]**2
-    d = alpha**2 / (np.pi * h[:, 2]**4 * (alpha**2 + tan2)**2)
+    tan2 = (1 - h[:, 2] ** 2) / h[:, 2] ** 2
+    d = alpha**2 / (np.pi * h[:, 2] ** 4 * (alpha**2 + tan2) ** 2)
     common = d * masking("height_correlated", alpha, wo[:, 2], np.abs(wi[:, 2]))
     f = fresnel(np.maximum(cos_o, 0), eta)
     reflection = f * common / (4 * wo[:, 2])
-    transmission = np.abs(cos_i * cos_o) / wo[:, 2] * (1 - f) * common / (eta * cos_i + cos_o)**2
+    transmission = np.abs(cos_i * cos_o) / wo[:, 2] * (1 - f) * common / (eta * cos_i + cos_o) ** 2
     possible = (cos_o > 0) & (~refracted | (cos_i < 0))
     return np.asarray(np.where(possible, np.where(refracted, transmission, reflection), 0))
 
@@ -90,7 +90,7 @@ def test_energy_is_that_of_a_single_bounce(device: Device, front: bool) -> None:
     for roughness, least in ((0.6, 0.75), (1.0, 0.45)):
         expected = 4 * np.pi * walter(eta, roughness**2, wo, wi) * power
         glass = bsdfs(device, [Dielectric(roughness=roughness, multiple_scattering=False)])
-        kept = glass.sample(0, wo[:1 << 16], uniform(1 << 16, 3), front)[1][:, 0]
+        kept = glass.sample(0, wo[: 1 << 16], uniform(1 << 16, 3), front)[1][:, 0]
         error = np.hypot(expected.std() / np.sqrt(count), kept.std() / np.sqrt(len(kept)))
         assert least < kept.mean() < 1 and kept.mean() == pytest.approx(expected.mean(), abs=4.5 * error)
 
@@ -101,8 +101,8 @@ def test_thin_glass_is_the_sum_of_its_bounces(device: Device) -> None:
     numbers, c, k = uniform(1 << 16, 5), np.array(COLOR), np.arange(1, 200)[:, None]
     for cosine in (1.0, 0.4, 0.1):
         f = fresnel(np.array([cosine]), 1.5)
-        reflected = f + (1 - f)**2 * (c**(2 * k) * f**(2 * k - 1)).sum(axis=0)
-        passed = (1 - f)**2 * (c**(2 * k - 1) * f**(2 * k - 2)).sum(axis=0)
+        reflected = f + (1 - f) ** 2 * (c ** (2 * k) * f ** (2 * k - 1)).sum(axis=0)
+        passed = (1 - f) ** 2 * (c ** (2 * k - 1) * f ** (2 * k - 2)).sum(axis=0)
         for front in (True, False):
             wi, weight, _, specular = sheets.sample(0, view(cosine), numbers, front)
             back = wi[:, 2] > 0
@@ -122,8 +122,12 @@ def test_light_behind_ground_glass_is_found(device: Device) -> None:
     """A small emitter below it, sampled as a light: radiance is f(wo, wi)·cos·L·Ω, for any number of lights."""
     glass = Dielectric(ior=1.5, roughness=0.5, color=COLOR)
     lamp = Sphere(center=(0.3, 0.4, -1.0), radius=0.01, material=Diffuse(emission=(9e4, 9e4, 9e4)))
-    scene = Scene(meshes=[_plane(0.0, glass)], spheres=[lamp], camera=DOWN,
-                  render=RenderSettings(size=(16, 16), spp=256, max_depth=2))
+    scene = Scene(
+        meshes=[_plane(0.0, glass)],
+        spheres=[lamp],
+        camera=DOWN,
+        render=RenderSettings(size=(16, 16), spp=256, max_depth=2),
+    )
     wi = np.array([[0.3, 0.4, -1.0]]) / np.sqrt(1.25)
     value = bsdfs(device, [glass]).value(0, np.array([0.0, 0.0, 1.0]), wi)[0]
     expected = np.broadcast_to(value * 9e4 * np.pi * 1e-4 / 1.25, (16, 16, 3))
@@ -137,8 +141,9 @@ def test_found_and_sampled_light_through_ground_glass_agree(device: Device) -> N
     """A large emitter below a rough surface with MIS: radiance is the transmitted furnace energy over 1.5²."""
     glass = Dielectric(ior=1.5, roughness=0.7)
     lamp = _plane(-0.5, Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0)), 500.0)
-    scene = Scene(meshes=[_plane(0.0, glass), lamp], camera=DOWN,
-                  render=RenderSettings(size=(16, 16), spp=1024, max_depth=2))
+    scene = Scene(
+        meshes=[_plane(0.0, glass), lamp], camera=DOWN, render=RenderSettings(size=(16, 16), spp=1024, max_depth=2)
+    )
     wi, weight, _, _ = bsdfs(device, [glass]).sample(0, np.array([0.0, 0.0, 1.0]), uniform(1 << 18, 9))
     expected = float(weight[wi[:, 2] < 0][:, 0].sum() / len(wi) / 2.25)
     assert film(device, scene).mean.mean() == pytest.approx(expected, rel=0.01)
@@ -148,51 +153,79 @@ def test_glass_absorbs_by_the_way_inside(device: Device) -> None:
     """A slab of thickness d under a white sky: F, and T = color^(d/distance) for every internal crossing."""
     glass = Dielectric(ior=1.5, attenuation_color=COLOR, attenuation_distance=0.5)
     back = quad([(-99, 99, -2), (99, 99, -2), (99, -99, -2), (-99, -99, -2)], glass)
-    picture = film(device, Scene(meshes=[_plane(-1.0, glass), back], camera=DOWN, environment=WHITE,
-                                 render=RenderSettings(size=(32, 32), spp=256, max_depth=32)))
-    t, f = np.array(COLOR)**2, 0.04
-    through = (1 - f)**2 * t / (1 - (f * t)**2)
+    picture = film(
+        device,
+        Scene(
+            meshes=[_plane(-1.0, glass), back],
+            camera=DOWN,
+            environment=WHITE,
+            render=RenderSettings(size=(32, 32), spp=256, max_depth=32),
+        ),
+    )
+    t, f = np.array(COLOR) ** 2, 0.04
+    through = (1 - f) ** 2 * t / (1 - (f * t) ** 2)
     expected = f + through + through * f * t
     noise = 4 * np.sqrt(f * (1 - f) / picture.pixels["count"].sum())
     assert np.allclose(picture.mean.mean(axis=(0, 1)), expected, rtol=1e-6, atol=noise)
 
 
-@pytest.mark.parametrize(("sheet", "integrator"), [
-    (Dielectric(ior=1.0, thin=True), "path"), (Dielectric(ior=1.0, thin=True), "local"),
-    (MetallicRoughness(color=(1.0, 1.0, 1.0), ior=1.0, roughness=0.0, transmission=1.0), "path")])
+@pytest.mark.parametrize(
+    ("sheet", "integrator"),
+    [
+        (Dielectric(ior=1.0, thin=True), "path"),
+        (Dielectric(ior=1.0, thin=True), "local"),
+        (MetallicRoughness(color=(1.0, 1.0, 1.0), ior=1.0, roughness=0.0, transmission=1.0), "path"),
+    ],
+)
 def test_a_sheet_does_not_end_what_absorbs(device: Device, sheet: Material, integrator: Integrator) -> None:
     """A non-refracting slab of thickness 2 with a clear sheet across it: color^(2/distance) of a white sky."""
     glass = Dielectric(ior=1.0, attenuation_color=COLOR, attenuation_distance=0.5)
     back = quad([(-99, 99, -2), (99, 99, -2), (99, -99, -2), (-99, -99, -2)], glass)
-    picture = film(device, Scene(meshes=[_plane(0.0, glass), back, _plane(-0.7, sheet)], camera=DOWN, environment=WHITE,
-                                 render=RenderSettings(size=(8, 8), spp=1, integrator=integrator)))
-    assert np.allclose(picture.mean, np.array(COLOR)**4, rtol=2e-3)
+    picture = film(
+        device,
+        Scene(
+            meshes=[_plane(0.0, glass), back, _plane(-0.7, sheet)],
+            camera=DOWN,
+            environment=WHITE,
+            render=RenderSettings(size=(8, 8), spp=1, integrator=integrator),
+        ),
+    )
+    assert np.allclose(picture.mean, np.array(COLOR) ** 4, rtol=2e-3)
 
 
 @pytest.mark.parametrize("integrator", ["path", "local", "raster"])
 @pytest.mark.parametrize("placed", [False, True])
 @pytest.mark.parametrize("scale", [1.0, 2.0**30])
-def test_light_inside_is_absorbed_on_its_way_too(device: Device, scale: float, placed: bool,
-                                                 integrator: Integrator) -> None:
-    """A point light in a non-refracting box lights its floor: albedo·I/(pi·d²)·color^((d + camera distance)/distance).
-    """
+def test_light_inside_is_absorbed_on_its_way_too(
+    device: Device, scale: float, placed: bool, integrator: Integrator
+) -> None:
+    """A point light in a non-refracting box lights its floor: albedo·I/(pi·d²)·color^((d + camera
+    distance)/distance)."""
     box = Dielectric(ior=1.0, attenuation_color=COLOR, attenuation_distance=scale)
     floor = _plane(-scale, Diffuse(color=(0.5, 0.5, 0.5)), 2 * scale)
     light = PointLight(position=(0.0, 0.0, -scale / 2), intensity=(7.0 * scale**2,) * 3)
     lid = _plane(0.0, box, 9 * scale)
     parts: dict[str, Any] = {"meshes": [floor], "instances": [Instance(lid)]} if placed else {"meshes": [lid, floor]}
-    picture = film(device, Scene(**parts, lights=[light],
-                                 camera=replace(DOWN, position=(0.0, 0.0, 4.0 * scale)),
-                                 render=RenderSettings(size=(8, 8), spp=4, max_depth=3, integrator=integrator)))
-    expected = 0.5 / np.pi * 7 / 0.25 * np.array(COLOR)**1.5
+    picture = film(
+        device,
+        Scene(
+            **parts,
+            lights=[light],
+            camera=replace(DOWN, position=(0.0, 0.0, 4.0 * scale)),
+            render=RenderSettings(size=(8, 8), spp=4, max_depth=3, integrator=integrator),
+        ),
+    )
+    expected = 0.5 / np.pi * 7 / 0.25 * np.array(COLOR) ** 1.5
     assert np.allclose(picture.mean, expected, rtol=1e-4)
 
 
 def test_only_glass_that_asks_pays(device: Device) -> None:
     """Smooth glass without absorption compiles no code for either."""
+
     def compiled(*materials: Dielectric) -> str:
-        return compile_scene(Scene(spheres=[Sphere(material=m) for m in materials], environment=WHITE),
-                             Choices(device.lanes)).source
+        return compile_scene(
+            Scene(spheres=[Sphere(material=m) for m in materials], environment=WHITE), Choices(device.lanes)
+        ).source
 
     plain = compiled(Dielectric())
     assert "visible_normal" not in plain and "roughness" not in plain.split('#line 1 "')[0]

@@ -16,8 +16,9 @@ from ..check.sabotage import sabotaged
 
 
 @pytest.mark.statistics
-def test_products_that_are_rounded_before_they_are_added(device: Device, tmp_path: Path,
-                                                         monkeypatch: pytest.MonkeyPatch) -> None:
+def test_products_that_are_rounded_before_they_are_added(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Compilers may contract a·b + c to one fused operation. About two of 10 000 paths diverge by that."""
     scene, subject = everything((48, 48)), Subject(device.info.index)
     contracted = subject.picture(scene, 4)

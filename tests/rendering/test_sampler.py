@@ -27,12 +27,22 @@ def probe_of(device: Device, sampler: Sampler, **chosen: Any) -> Probe:
     return Probe(device, Scene(render=RenderSettings(sampler=sampler)), **chosen)
 
 
-def draw(probe: Probe, pixel: ArrayLike, sample: ArrayLike, dimension: int = 0, seed: int = 0,
-         block_bits: int = 32) -> Doubles:
+def draw(
+    probe: Probe, pixel: ArrayLike, sample: ArrayLike, dimension: int = 0, seed: int = 0, block_bits: int = 32
+) -> Doubles:
     """Return the numbers (n, 2) of pixels and samples, which broadcast."""
     p, s = np.broadcast_arrays(np.asarray(pixel, np.int64), np.asarray(sample, np.int64))
-    return probe("random", 2, p.ravel() >> 16, p.ravel() & 0xffff, s.ravel() >> 16, s.ravel() & 0xffff, seed=seed,
-                 dimension=dimension, block_bits=block_bits)
+    return probe(
+        "random",
+        2,
+        p.ravel() >> 16,
+        p.ravel() & 0xFFFF,
+        s.ravel() >> 16,
+        s.ravel() & 0xFFFF,
+        seed=seed,
+        dimension=dimension,
+        block_bits=block_bits,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +53,10 @@ def sobol(device: Device) -> Probe:
 def fills_all_boxes(points: Doubles) -> bool:
     """Return whether 2^m points are a (0, m, 2)-net: one in each box of area 2^-m with power-of-two sides."""
     bits = len(points).bit_length() - 1
-    return all(len(np.unique((points * [1 << a, 1 << (bits - a)]).astype(int) @ [1 << bits, 1])) == len(points)
-               for a in range(bits + 1))
+    return all(
+        len(np.unique((points * [1 << a, 1 << (bits - a)]).astype(int) @ [1 << bits, 1])) == len(points)
+        for a in range(bits + 1)
+    )
 
 
 @pytest.mark.parametrize("bits", [1, 2, 5, 10])
@@ -82,7 +94,7 @@ def test_error_of_a_mean_falls_as_theory_says(device: Device, sampler: Sampler, 
     for bits in (0, 3, 6):
         n = 1 << bits
         means = draw(probe, np.arange(pixels)[:, None], np.arange(n)).reshape(pixels, n, 2).mean(axis=1)
-        squares = ((means - 0.5)**2).sum(axis=0) * 12 * float(n)**power
+        squares = ((means - 0.5) ** 2).sum(axis=0) * 12 * float(n) ** power
         assert np.all(2 * chi2.sf(np.maximum(squares, 2 * pixels - squares), pixels) > FAMILY / 12)
 
 
@@ -94,7 +106,7 @@ def test_sobol_scrambling_is_as_good_as_scipys(sobol: Probe) -> None:
 
     def squares(points: Doubles) -> Doubles:
         x, y = points[..., 0], points[..., 1]
-        return np.stack([((x * y).mean(axis=1) - 0.25)**2, ((x + y < 1).mean(axis=1) - 0.5)**2])
+        return np.stack([((x * y).mean(axis=1) - 0.25) ** 2, ((x + y < 1).mean(axis=1) - 0.5) ** 2])
 
     a, b = squares(ours), squares(theirs)
     z = (a.mean(axis=1) - b.mean(axis=1)) / np.sqrt((a.var(axis=1) + b.var(axis=1)) / pixels)
@@ -118,9 +130,13 @@ def test_pixels_dimensions_and_seeds_are_unrelated(device: Device, sampler: Samp
     pixels = 7 * (1 << 20) + np.arange(count)
     for sample in (0, 5):
         first = draw(probe, pixels, sample, 4, 9)
-        others = {"dimension": draw(probe, pixels, sample, 5, 9), "far": draw(probe, pixels, sample, 4 + 256, 9),
-                  "seed": draw(probe, pixels, sample, 4, 10), "neighbour": draw(probe, pixels + 1, sample, 4, 9),
-                  "itself": first[:, ::-1]}
+        others = {
+            "dimension": draw(probe, pixels, sample, 5, 9),
+            "far": draw(probe, pixels, sample, 4 + 256, 9),
+            "seed": draw(probe, pixels, sample, 4, 10),
+            "neighbour": draw(probe, pixels + 1, sample, 4, 9),
+            "itself": first[:, ::-1],
+        }
         for name, other in others.items():
             for axis in (0, 1):
                 cells = (first[:, axis] * 16).astype(int) * 16 + (other[:, axis] * 16).astype(int)
@@ -139,9 +155,19 @@ def test_pictures_are_unbiased(device: Device, sampler: Sampler, spp: int) -> No
     lamp = Sphere(center=(0, height, 0), radius=radius, material=Diffuse(color=(0, 0, 0), emission=(radiance,) * 3))
     camera = Camera(position=(0.0, 1.0, 0.0), look_at=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), fov_degrees=90)
     place = (np.arange(512) + 0.5) / 256 - 1
-    d2 = place[:, None]**2 + place**2 + height**2
+    d2 = place[:, None] ** 2 + place**2 + height**2
     truth = float(np.mean(albedo * radiance * radius**2 * height / d2**1.5))
-    means = [film(device, Scene(meshes=[floor], spheres=[lamp], camera=camera,
-                                render=RenderSettings(size=(8, 8), spp=spp, max_depth=2, seed=seed)),
-                  sampler=sampler).mean.mean() for seed in range(64)]
-    assert mean_test(float(np.mean(means)), float(np.var(means, ddof=1)) + (1e-6 * truth)**2, 64, truth) > FAMILY
+    means = [
+        film(
+            device,
+            Scene(
+                meshes=[floor],
+                spheres=[lamp],
+                camera=camera,
+                render=RenderSettings(size=(8, 8), spp=spp, max_depth=2, seed=seed),
+            ),
+            sampler=sampler,
+        ).mean.mean()
+        for seed in range(64)
+    ]
+    assert mean_test(float(np.mean(means)), float(np.var(means, ddof=1)) + (1e-6 * truth) ** 2, 64, truth) > FAMILY

@@ -76,7 +76,7 @@ def test_warps_report_their_closed_forms(probe: Probe) -> None:
         np.testing.assert_allclose(np.linalg.norm(out[:, [0, 1, 2, 4, 5, 6]].reshape(-1, 2, 3), axis=2), 1, atol=3e-7)
         np.testing.assert_allclose(out[:, 3], np.maximum(out[:, 2], 0) / np.pi, rtol=2e-7)
         np.testing.assert_allclose(out[:, 7], 1 / (2 * np.pi * height), rtol=1e-6)
-        sin2 = out[:, 4]**2 + out[:, 5]**2
+        sin2 = out[:, 4] ** 2 + out[:, 5] ** 2
         assert np.max(np.where(out[:, 6] > 0, sin2 / (1 + np.abs(out[:, 6])), 1 - out[:, 6])) <= height * (1 + 1e-6)
         assert out[:, 8:10].min() >= 0 and out[:, 8:10].sum(axis=1).max() <= 1 + 2e-7
 
@@ -94,7 +94,7 @@ def test_sine_and_cosine_of_turns(probe: Probe) -> None:
     u = np.concatenate([np.arange(0, 1 << 24, 16), np.arange(1, 16), (1 << 24) - np.arange(1, 16)]) / (1 << 24)
     sine, cosine = probe("warps", 12, u, np.zeros((len(u), 2)))[:, 10:].T
     exact = np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)
-    assert np.abs(sine - exact[0]).max() < 2.0**-23     # one unit in the last place of 1
+    assert np.abs(sine - exact[0]).max() < 2.0**-23  # one unit in the last place of 1
     assert np.abs(cosine - exact[1]).max() < 2.0**-23
     small = (u > 0) & (u < 0.125)
     assert np.abs(sine[small] / exact[0][small] - 1).max() < 3e-7

@@ -24,7 +24,7 @@ UP = np.array([0.0, 1.0, 0.0])
 def gradient() -> NDArray[np.float32]:
     """Return an image that is much brighter downwards and varies around, differently per channel."""
     v, u = np.meshgrid((np.arange(HEIGHT) + 0.5) / HEIGHT, (np.arange(WIDTH) + 0.5) / WIDTH, indexing="ij")
-    bright = 0.1 + v**3 * (1.5 + np.sin(2 * np.pi * u))**2
+    bright = 0.1 + v**3 * (1.5 + np.sin(2 * np.pi * u)) ** 2
     return np.stack([bright, 2 * bright, bright * (1.2 + np.cos(2 * np.pi * u))], axis=-1).astype(np.float32)
 
 
@@ -53,8 +53,14 @@ def texel(values: tuple[float, float, float]) -> NDArray[np.float32]:
     return np.array([[values]], np.float32)
 
 
-SKIES = {"gradient": (gradient(), 0.0), "turned": (gradient(), 77.0), "sun": (sun(), -130.0),
-         "low_sun": (low_sun(), 0.0), "smooth": (smooth(), 30.0), "one_texel": (texel((0.5, 1.0, 2.0)), 10.0)}
+SKIES = {
+    "gradient": (gradient(), 0.0),
+    "turned": (gradient(), 77.0),
+    "sun": (sun(), -130.0),
+    "low_sun": (low_sun(), 0.0),
+    "smooth": (smooth(), 30.0),
+    "one_texel": (texel((0.5, 1.0, 2.0)), 10.0),
+}
 #: Those that are left to the surfaces' own directions.
 EVEN = ("smooth", "one_texel")
 
@@ -94,12 +100,14 @@ def test_radiance_follows_the_convention(probe: Probe, name: str) -> None:
     image, rotation = SKIES[name]
     w = directions(100_000)
     found = seen(probe, w)[:, :3]
-    steps = [np.abs(np.diff(image.astype(np.float64), axis=axis, append=image.take([0], axis=axis))).max(initial=0)
-             for axis in (0, 1)]
+    steps = [
+        np.abs(np.diff(image.astype(np.float64), axis=axis, append=image.take([0], axis=axis))).max(initial=0)
+        for axis in (0, 1)
+    ]
     # Near the poles the azimuth's uncertainty is the direction's last digits over its sine.
     blur = 4e-7 * np.maximum(1, 0.1 / np.maximum(np.hypot(w[:, 0], w[:, 2]), 1e-30))
     tolerance = blur * max(steps) * 2 * WIDTH + 1e-6 * image.max()
-    smooth = np.hypot(w[:, 0], w[:, 2]) > 1e-5   # at a pole any azimuth is right
+    smooth = np.hypot(w[:, 0], w[:, 2]) > 1e-5  # at a pole any azimuth is right
     error = np.abs(found - skies.lookup(image, w, rotation)).max(axis=1)
     assert np.all(error[smooth] <= tolerance[smooth])
     assert np.isfinite(found).all()
@@ -107,8 +115,9 @@ def test_radiance_follows_the_convention(probe: Probe, name: str) -> None:
 
 def test_density_integrates_to_one(probe: Probe, name: str) -> None:
     """∫ pdf dω by the midpoint rule with 8 by 8 points per texel, in which pdf·sin θ is constant."""
-    v, u = np.meshgrid((np.arange(8 * HEIGHT) + 0.5) / (8 * HEIGHT), (np.arange(8 * WIDTH) + 0.5) / (8 * WIDTH),
-                       indexing="ij")
+    v, u = np.meshgrid(
+        (np.arange(8 * HEIGHT) + 0.5) / (8 * HEIGHT), (np.arange(8 * WIDTH) + 0.5) / (8 * WIDTH), indexing="ij"
+    )
     pdf = seen(probe, skies.from_uv(u.ravel(), v.ravel()))[:, 3]
     integral = np.sum(pdf * np.sin(np.pi * v.ravel())) * 2 * np.pi**2 / v.size
     # If the image is rotated, points on texel edges round to either side.
@@ -130,7 +139,7 @@ def test_samples_follow_the_density(probe: Probe, name: str) -> None:
     cell = np.minimum((v * height).astype(int), height - 1) * width + np.minimum((u * width).astype(int), width - 1)
     density = probe.compiled.buffers["sky_texels"][1]["density"].astype(np.float64)
     found = np.bincount(cell, minlength=density.size)
-    edges = np.bincount(cell[density[cell] == 0], minlength=density.size)    # rounded to the other side of an edge
+    edges = np.bincount(cell[density[cell] == 0], minlength=density.size)  # rounded to the other side of an edge
     assert edges.sum() < 1e-5 * COUNT
     assert chi2_test(found - edges, density / density.sum() * (COUNT - edges.sum())) > 1e-4
 
@@ -147,8 +156,11 @@ def test_what_is_brighter_than_the_mean_is_sampled(probe: Probe, name: str) -> N
     image, rotation = SKIES[name]
     height, width = image.shape[:2]
     steps = 24
-    v, u = np.meshgrid((np.arange(height * steps) + 0.5) / (height * steps),
-                       (np.arange(width * steps) + 0.5) / (width * steps), indexing="ij")
+    v, u = np.meshgrid(
+        (np.arange(height * steps) + 0.5) / (height * steps),
+        (np.arange(width * steps) + 0.5) / (width * steps),
+        indexing="ij",
+    )
     light = skies.lookup(image, skies.from_uv(u.ravel(), v.ravel())) @ [0.2126, 0.7152, 0.0722]
     texels = light.reshape(height, steps, width, steps).mean(axis=(1, 3))
     angle = -np.diff(np.cos(np.pi * np.arange(height + 1) / height))[:, None] * np.ones((1, width))
@@ -168,7 +180,7 @@ def test_irradiance(probe: Probe, name: str) -> None:
         sample = sampled(probe, normal, seed)
         values = sample[:, 3:6] * (np.maximum(sample[:, :3] @ normal, 0) / sample[:, 6])[:, None]
         expected = skies.irradiance(image, normal, rotation, where=where)
-        variance = values.var(axis=0) + COUNT * (3e-5 * expected)**2   # including the quadrature's own error
+        variance = values.var(axis=0) + COUNT * (3e-5 * expected) ** 2  # including the quadrature's own error
         p_values.append(mean_test(values.mean(axis=0), variance, COUNT, expected))
     assert np.min(p_values) > sidak(FAMILY, np.size(p_values))
 
@@ -182,6 +194,9 @@ def test_constant_sky(device: Device) -> None:
 
 
 def test_black_sky_is_left_out(device: Device) -> None:
-    for black in (Environment(), Environment(image=np.zeros((2, 4, 3), np.float32)),
-                  Environment(color=(1.0, 1.0, 1.0), strength=0.0)):
+    for black in (
+        Environment(),
+        Environment(image=np.zeros((2, 4, 3), np.float32)),
+        Environment(color=(1.0, 1.0, 1.0), strength=0.0),
+    ):
         assert "SKY" not in Probe(device, Scene(environment=black)).compiled.features

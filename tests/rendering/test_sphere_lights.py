@@ -55,14 +55,24 @@ def lit(kind: str, integrator: Integrator, radius: float, gap: float, cosine: fl
         scene.spheres.append(Sphere(center=tuple((p - size * n).tolist()), radius=size, material=grey))
     elif kind == "instance":
         mesh = Mesh(QUAD, FACES, grey)
-        scene.instances.extend(Instance(mesh, np.column_stack([10 * radius * turn, p - depth * radius * n]))
-                               for depth in (0, 5))
+        scene.instances.extend(
+            Instance(mesh, np.column_stack([10 * radius * turn, p - depth * radius * n])) for depth in (0, 5)
+        )
     else:
         scene.meshes.append(Mesh((10 * radius * QUAD @ turn.T + p).astype(np.float32), FACES, grey))
-    scene.spheres.append(Sphere(center=tuple((p + distance * toward).tolist()), radius=radius,
-                                material=Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0))))
-    scene.camera = Camera(position=tuple((p + gap * radius / 2 * n).tolist()), look_at=tuple(p.tolist()),
-                          up=tuple(turn[:, 0].tolist()), fov_degrees=0.2)
+    scene.spheres.append(
+        Sphere(
+            center=tuple((p + distance * toward).tolist()),
+            radius=radius,
+            material=Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0)),
+        )
+    )
+    scene.camera = Camera(
+        position=tuple((p + gap * radius / 2 * n).tolist()),
+        look_at=tuple(p.tolist()),
+        up=tuple(turn[:, 0].tolist()),
+        fov_degrees=0.2,
+    )
     scene.render = RenderSettings(size=(8, 8), spp=512, max_depth=2, integrator=integrator)
     return scene
 
@@ -82,8 +92,11 @@ def test_near_and_far(device: Device, kind: str, integrator: Integrator, monkeyp
 
 
 #: One variant of each material type with transmission lobes.
-PASSED = {kind.__name__: next(each for each in variants(kind) if "TRANSMISSION_LOBES" in each.features())
-          for kind in MATERIALS if any("TRANSMISSION_LOBES" in each.features() for each in variants(kind))}
+PASSED = {
+    kind.__name__: next(each for each in variants(kind) if "TRANSMISSION_LOBES" in each.features())
+    for kind in MATERIALS
+    if any("TRANSMISSION_LOBES" in each.features() for each in variants(kind))
+}
 
 
 @pytest.mark.parametrize("kind", PASSED)
@@ -93,10 +106,11 @@ def test_a_sphere_does_not_light_itself(device: Device, kind: str) -> None:
     for _ in range(COUNT // 2):
         radius = 10.0 ** rng.uniform(-2, 3)
         center = directions(rng, 1)[0] * radius * 10.0 ** rng.uniform(-2, 3)
-        scene = Scene(spheres=[Sphere(center=tuple(center.tolist()), radius=radius, material=material)],
-                      camera=Camera(position=tuple((center + [0, 0, 3 * radius]).tolist()),
-                                    look_at=tuple(center.tolist())),
-                      render=RenderSettings(size=(16, 16), spp=64, max_depth=3))
+        scene = Scene(
+            spheres=[Sphere(center=tuple(center.tolist()), radius=radius, material=material)],
+            camera=Camera(position=tuple((center + [0, 0, 3 * radius]).tolist()), look_at=tuple(center.tolist())),
+            render=RenderSettings(size=(16, 16), spp=64, max_depth=3),
+        )
         shine = film(device, replace(scene, render=replace(scene.render, max_depth=1)))
         np.testing.assert_array_equal(film(device, scene).mean, shine.mean)
 
@@ -108,8 +122,10 @@ def test_light_in_part_opaque(device: Device, integrator: Integrator) -> None:
     for _ in range(4):
         opacity, lamp = rng.uniform(0.1, 0.9), Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0))
         scene = lit("flat", integrator, 1.0, 10.0 ** rng.uniform(-1, 1), rng.uniform(0.3, 1), rng)
-        opaque, clear = (film(device, with_lamp(scene, each), sampler="sobol").mean.mean()
-                         for each in (lamp, replace(lamp, opacity=opacity)))
+        opaque, clear = (
+            film(device, with_lamp(scene, each), sampler="sobol").mean.mean()
+            for each in (lamp, replace(lamp, opacity=opacity))
+        )
         assert clear == pytest.approx(opacity * opaque, rel=0.01)
 
 

@@ -55,18 +55,18 @@ LIMITS = [("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8), ("packs", 12)]
 
 
 @pytest.mark.parametrize(("layout", "limit"), [("bvh8", 8), *others(*LIMITS)])
-def test_in_parts_it_is_the_same_picture(device: Device, whole: tuple[Renderer, bytes],
-                                         monkeypatch: pytest.MonkeyPatch, layout: LayoutName,
-                                         limit: int) -> None:
+def test_in_parts_it_is_the_same_picture(
+    device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch, layout: LayoutName, limit: int
+) -> None:
     """Bit for bit, in every layout; no buffer exceeds the limit, and at 8 KiB most arrays fill several."""
     running = assert_same_in_parts(device, whole, monkeypatch, layout, limit)
     assert len(buffers_of(running)) > len(running.compiled.buffers) + (0 if limit > 8 else 6)
 
 
 @pytest.mark.parametrize(("layout", "limit"), LIMITS[1:3] + others(LIMITS[0], *LIMITS[3:]))
-def test_in_parts_the_same_is_seen_first(device: Device, whole_depth: tuple[Renderer, bytes],
-                                         monkeypatch: pytest.MonkeyPatch, layout: LayoutName,
-                                         limit: int) -> None:
+def test_in_parts_the_same_is_seen_first(
+    device: Device, whole_depth: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch, layout: LayoutName, limit: int
+) -> None:
     """As above, for the depth integrator, whose programs are small."""
     running = assert_same_in_parts(device, whole_depth, monkeypatch, layout, limit)
     assert len(buffers_of(running)) > len(running.compiled.buffers)
@@ -76,8 +76,9 @@ def buffers_of(running: Renderer) -> list[cl.Buffer]:
     return [each for each in running.session.scene_arguments if isinstance(each, cl.Buffer)]
 
 
-def assert_same_in_parts(device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch,
-                         layout: LayoutName, limit: int) -> Renderer:
+def assert_same_in_parts(
+    device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch, layout: LayoutName, limit: int
+) -> Renderer:
     """Return the renderer whose largest buffer has `limit` KiB, after checking that its image is that of `whole`."""
     assert isinstance(whole[0].session, SingleDeviceAccumulation) and whole[0].compiled.part_bytes is None
     monkeypatch.setenv(VARIABLE, f"{limit}K")
@@ -87,8 +88,9 @@ def assert_same_in_parts(device: Device, whole: tuple[Renderer, bytes], monkeypa
     return running
 
 
-def test_only_the_film_is_too_large(device: Device, whole: tuple[Renderer, bytes],
-                                    monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_the_film_is_too_large(
+    device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The program is the one for large buffers, except for the location of the film's pixels."""
     monkeypatch.setenv(VARIABLE, "80K")
     running, found = film(device, "bvh8")
@@ -97,18 +99,22 @@ def test_only_the_film_is_too_large(device: Device, whole: tuple[Renderer, bytes
 
 
 @pytest.mark.combinations
-def test_other_kernels_see_the_parts(device: Device, whole: tuple[Renderer, bytes],
-                                     monkeypatch: pytest.MonkeyPatch) -> None:
+def test_other_kernels_see_the_parts(
+    device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
     expected = render_guides(whole[0].session, 2)
     monkeypatch.setenv(VARIABLE, "8K")
     found = render_guides(film(device, "bvh8")[0].session, 2)
     assert all(found[name].tobytes() == expected[name].tobytes() for name in expected)
 
 
-@pytest.mark.parametrize(("limit", "words"), [("4K", [f"{VARIABLE} to 5440", "4096"]),
-                                              ("5440", ["at most 5.312 KiB", "MiB needs more", VARIABLE])])
-def test_too_small_is_told_with_numbers(device: Device, monkeypatch: pytest.MonkeyPatch, limit: str,
-                                        words: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("limit", "words"),
+    [("4K", [f"{VARIABLE} to 5440", "4096"]), ("5440", ["at most 5.312 KiB", "MiB needs more", VARIABLE])],
+)
+def test_too_small_is_told_with_numbers(
+    device: Device, monkeypatch: pytest.MonkeyPatch, limit: str, words: list[str]
+) -> None:
     """A pack of triangles takes 320 bytes, and 17 must fit."""
     monkeypatch.setenv(VARIABLE, limit)
     vertices, faces = icosphere(4)
@@ -125,8 +131,8 @@ def test_parts_hold_all_and_end_with_the_next(size: int) -> None:
     assert own == 112 and len(found) == part_count(values, 2048) and max(part.nbytes for part in found) <= 2048
     for i in range(size):
         assert found[i // own][i % own] == values[i]
-        run = values[i:i + OVERLAP + 1]
-        assert np.array_equal(found[i // own][i % own:i % own + len(run)], run)
+        run = values[i : i + OVERLAP + 1]
+        assert np.array_equal(found[i // own][i % own : i % own + len(run)], run)
 
 
 @pytest.mark.parametrize(("text", "expected"), [("", 1 << 40), ("65536", 1 << 16), ("1M", 1 << 20), ("9999G", 1 << 40)])

@@ -46,17 +46,29 @@ def spots(count: int, seed: int = 0) -> list[SpotLight]:
     rng = np.random.default_rng(seed)
     outer, powers = rng.uniform(0.5, 89.0, count), 10.0 ** rng.uniform(-2, 2, count)
     places, axes = rng.uniform(-1, 1, (count, 3)).tolist(), directions(rng, count).tolist()
-    return [SpotLight(position=tuple(place), direction=tuple(axis), intensity=(power, 0.5 * power, 2.0 * power),
-                      inner_degrees=width * (i % 3) / 3, outer_degrees=width)
-            for i, (place, axis, width, power) in enumerate(zip(places, axes, outer.tolist(), powers.tolist()))]
+    return [
+        SpotLight(
+            position=tuple(place),
+            direction=tuple(axis),
+            intensity=(power, 0.5 * power, 2.0 * power),
+            inner_degrees=width * (i % 3) / 3,
+            outer_degrees=width,
+        )
+        for i, (place, axis, width, power) in enumerate(zip(places, axes, outer.tolist(), powers.tolist()))
+    ]
 
 
 @pytest.mark.parametrize(("inner", "outer"), [(0.0, 45.0), (20.0, 30.0), (29.9999, 30.0), (0.0, 90.0), (0.0, 1e-3)])
 def test_irradiance(device: Device, inner: float, outer: float) -> None:
     """On the axis, off it by fractions of the outer angle, and outside; near and far. A narrow cone is axis-aligned,
     so that float32 represents the points' angles."""
-    light = SpotLight(position=(0.0, 0.0, 0.0), direction=(3.0, -4.0, 0.0) if outer > 1 else (2.0, 0.0, 0.0),
-                      intensity=(60.0, 5.0, 1.0), inner_degrees=inner, outer_degrees=outer)
+    light = SpotLight(
+        position=(0.0, 0.0, 0.0),
+        direction=(3.0, -4.0, 0.0) if outer > 1 else (2.0, 0.0, 0.0),
+        intensity=(60.0, 5.0, 1.0),
+        inner_degrees=inner,
+        outer_degrees=outer,
+    )
     axis, aside = np.array(light.direction) / np.linalg.norm(light.direction), np.array([0.0, 0.0, 1.0])
     parts = np.radians(outer) * np.array([0.0, 0.3, 0.6, 0.9, 0.99, 1.01])
     rays = np.outer(np.cos(parts), axis) + np.outer(np.sin(parts), aside)
@@ -79,13 +91,17 @@ def test_ranges_end_light(device: Device, unit: float) -> None:
     lights: list[PointLight | SpotLight] = [
         PointLight(position=(0.0, 0.0, 0.0), intensity=(3.0, 2.0, 1.0), range=reach),
         SpotLight(position=(0.0, 0.0, 0.0), direction=(0.0, -1.0, 0.0), intensity=(1.0, 2.0, 3.0), range=reach / 2),
-        PointLight(position=(0.0, 0.0, 0.0), intensity=(0.1, 0.1, 0.1))]
+        PointLight(position=(0.0, 0.0, 0.0), intensity=(0.1, 0.1, 0.1)),
+    ]
     size, heights = 9.0 * unit, np.array([0.3, 0.9, 0.99, 1.2, 1.9, 1.99, 2.1, 8.0]) * unit
     for height in heights.tolist():
-        camera = Camera(position=(0.0, 0.5 * -height, 0.0), look_at=(0.0, -height, 0.0), up=(0.0, 0.0, 1.0),
-                        fov_degrees=0.01)
-        floor = quad([(-size, -height, size), (size, -height, size), (size, -height, -size), (-size, -height, -size)],
-                     Diffuse(color=(1.0, 1.0, 1.0)))
+        camera = Camera(
+            position=(0.0, 0.5 * -height, 0.0), look_at=(0.0, -height, 0.0), up=(0.0, 0.0, 1.0), fov_degrees=0.01
+        )
+        floor = quad(
+            [(-size, -height, size), (size, -height, size), (size, -height, -size), (-size, -height, -size)],
+            Diffuse(color=(1.0, 1.0, 1.0)),
+        )
         expected = np.zeros(3)
         for light in lights:
             left = 1.0 if light.range is None else max(1 - (height / light.range) ** 4, 0.0)
@@ -97,8 +113,13 @@ def test_ranges_end_light(device: Device, unit: float) -> None:
 
 def test_picture_of_a_spot(device: Device) -> None:
     """A floor in a slanted cone: ρ/pi times the irradiance, pixel by pixel; a lid blocks all of it."""
-    light = SpotLight(position=(1.0, 3.0, 0.5), direction=(-0.3, -1.0, 0.1), intensity=(60.0, 50.0, 40.0),
-                      inner_degrees=10.0, outer_degrees=35.0)
+    light = SpotLight(
+        position=(1.0, 3.0, 0.5),
+        direction=(-0.3, -1.0, 0.1),
+        intensity=(60.0, 50.0, 40.0),
+        inner_degrees=10.0,
+        outer_degrees=35.0,
+    )
     camera, size = Camera(position=(0.0, 6.0, 2.0), fov_degrees=50), (24, 18)
     floor = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(0.5, 0.5, 0.5)))
     scene = Scene(meshes=[floor], lights=[light], camera=camera, render=RenderSettings(size=size, max_depth=2))
@@ -151,9 +172,12 @@ def test_few_are_chosen_by_what_they_bring(device: Device) -> None:
     miss = SpotLight(position=(0.0, 2.0, 0.0), direction=(1.0, -0.5, 0.0), intensity=(1e6, 1e6, 1e6), outer_degrees=20)
     hit = replace(miss, direction=(0.0, -1.0, 0.0), intensity=(8.0, 8.0, 8.0))
     lights: list[Light] = [
-        PointLight(position=(0.0, 1.0, 0.0), intensity=(2.0, 2.0, 2.0)), miss, hit,
-        DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0))]
+        PointLight(position=(0.0, 1.0, 0.0), intensity=(2.0, 2.0, 2.0)),
+        miss,
+        hit,
+        DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0)),
+    ]
     probe = Probe(device, Scene(lights=lights, environment=Environment(color=(1.0, 1.0, 1.0))))
-    brought = np.array([2.0, 0.0, 2.0, 1.0])   # numbered by type: point, spots, directional
+    brought = np.array([2.0, 0.0, 2.0, 1.0])  # numbered by type: point, spots, directional
     expected = 0.8 * brought / 5 + 0.2 * (brought > 0) / 3
     np.testing.assert_allclose(probabilities(probe, np.zeros(3), UP), expected, rtol=1e-5)

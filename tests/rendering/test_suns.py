@@ -36,7 +36,7 @@ def unit(v: object) -> Doubles:
 def disc(towards: Doubles, angle_degrees: float, steps: int = 64) -> tuple[Doubles, Doubles]:
     """Return midpoint directions (n, 3) of the disc and the solid angle of each, (n,)."""
     axes = np.linalg.svd(towards[None])[2]
-    height = 2 * np.sin(np.radians(angle_degrees) / 4)**2
+    height = 2 * np.sin(np.radians(angle_degrees) / 4) ** 2
     h = height * (np.arange(steps) + 0.5)[:, None] / steps
     phi = 2 * np.pi * (np.arange(steps) + 0.5) / steps
     sine = np.sqrt(h * (2 - h))
@@ -61,18 +61,22 @@ def test_irradiance(device: Device, angle: float, tilt: float) -> None:
     brought = out[:, 3:6] * (np.maximum(out[:, :3] @ normal, 0) / out[:, 6])[:, None]
     wi, solid_angle = disc(towards, angle, 2048)
     seen = np.sum(np.maximum(wi @ normal, 0) * solid_angle)
-    expected = seen / (np.pi * np.sin(np.radians(angle) / 2)**2) * np.array(E)
+    expected = seen / (np.pi * np.sin(np.radians(angle) / 2) ** 2) * np.array(E)
     if tilt == 0:
         np.testing.assert_allclose(expected, E, rtol=1e-6)
-    p = mean_test(brought.mean(axis=0), brought.var(axis=0) + COUNT * (1e-5 * expected)**2, COUNT, expected)
+    p = mean_test(brought.mean(axis=0), brought.var(axis=0) + COUNT * (1e-5 * expected) ** 2, COUNT, expected)
     assert p.min() > sidak(FAMILY, 16 * p.size), (brought.mean(axis=0), expected)
 
 
 def test_what_is_sampled_is_what_is_seen(device: Device) -> None:
     """Several overlapping discs: each sample's direction is inside its disc; the radiance there is that of all discs
     around it, each weighted by the power heuristic against its light sampling pdf."""
-    lights = [sun((0.3, -1.0, 0.1), 20.0), sun((0.2, -1.0, 0.2), 15.0, (1.0, 7.0, 2.0)),
-              sun((0.4, -1.0, 0.0), 0.53, (5.0, 1.0, 1.0)), sun((-1.0, -1.0, 0.0), 1e-3, (1.0, 1.0, 9.0))]
+    lights = [
+        sun((0.3, -1.0, 0.1), 20.0),
+        sun((0.2, -1.0, 0.2), 15.0, (1.0, 7.0, 2.0)),
+        sun((0.4, -1.0, 0.0), 0.53, (5.0, 1.0, 1.0)),
+        sun((-1.0, -1.0, 0.0), 1e-3, (1.0, 1.0, 9.0)),
+    ]
     towards = -unit([light.direction for light in lights])
     radiance = np.array([light.radiance for light in lights])
     probe = Probe(device, Scene(lights=list[Light](lights), environment=Environment(color=(0.1, 0.2, 0.3))))
@@ -81,18 +85,18 @@ def test_what_is_sampled_is_what_is_seen(device: Device) -> None:
     own = np.argmin(np.abs(out[:, None, 3:6] / radiance - 1).max(axis=-1), axis=1)
     np.testing.assert_allclose(out[:, 3:6], radiance[own], rtol=1e-6)
     cosines, half = out[:, :3] @ towards.T, np.radians([light.angle_degrees for light in lights]) / 2
-    angles = np.linalg.norm(out[:, None, :3] - towards, axis=-1)    # as precise for small angles as the arcs
+    angles = np.linalg.norm(out[:, None, :3] - towards, axis=-1)  # as precise for small angles as the arcs
     margin = 2e-7 / half
     inside = angles < 2 * np.sin(half / 2)
     assert np.all((angles <= 2 * np.sin(half / 2) * (1 + margin))[np.arange(COUNT), own]), cosines.min()
-    densities = np.array([np.mean(out[own == i, 6]) for i in range(4)])    # each light's: probability over solid angle
+    densities = np.array([np.mean(out[own == i, 6]) for i in range(4)])  # each light's: probability over solid angle
     sure = np.all(np.abs(angles / (2 * np.sin(half / 2)) - 1) > margin, axis=1)
     assert sure.mean() > 0.95
     found = np.random.default_rng(1).uniform(0.1, 3, COUNT) * out[:, 6]
     seen = probe("environment", 6, np.zeros((COUNT, 3)), normal, out[:, :3], found)
     sky = np.array([0.1, 0.2, 0.3])
     np.testing.assert_allclose(seen[sure, :3], (inside @ radiance + sky)[sure], rtol=1e-5)
-    weights = found[:, None]**2 / (found[:, None]**2 + densities**2)
+    weights = found[:, None] ** 2 / (found[:, None] ** 2 + densities**2)
     np.testing.assert_allclose(seen[sure, 3:], ((inside * weights) @ radiance + sky)[sure], rtol=1e-4)
 
 
@@ -109,8 +113,12 @@ def test_disc(device: Device, angle: float, mirrored: bool, integrator: Integrat
     mirror = Mesh(FLOOR.vertices, FLOOR.faces, Mirror(color=(0.5, 0.5, 0.5)))
     x, y, z = direction.tolist()
     camera = Camera(position=(0.0, 1.0, 0.0), look_at=(x, 1 + y, z), up=(1.0, 0.0, 0.0), fov_degrees=fov)
-    scene = Scene(meshes=[mirror], lights=[light], camera=camera,
-                  render=RenderSettings(size=(32, 32), spp=256, max_depth=2, integrator=integrator))
+    scene = Scene(
+        meshes=[mirror],
+        lights=[light],
+        camera=camera,
+        render=RenderSettings(size=(32, 32), spp=256, max_depth=2, integrator=integrator),
+    )
     pixels = film(device, scene).mean
     expected = np.array(light.radiance) * np.pi / 16 * (0.5 if mirrored else 1)
     # Rays of a float32 camera lie on a grid, which is coarse for the smallest disc.
@@ -131,8 +139,12 @@ def test_penumbra(device: Device, integrator: Integrator) -> None:
     light = sun((-3.0, -4.0, 0.0), 12.0)
     wall = quad([(0.0, 0.0, -99.0), (0.0, 0.0, 99.0), (0.0, 4.0, 99.0), (0.0, 4.0, -99.0)], Diffuse(color=BLACK))
     camera = Camera(position=(-3.0, 9.0, 0.0), look_at=(-3.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), fov_degrees=3.0)
-    scene = Scene(meshes=[FLOOR, wall], lights=[light], camera=camera,
-                  render=RenderSettings(size=(32, 4), spp=256, max_depth=2, integrator=integrator))
+    scene = Scene(
+        meshes=[FLOOR, wall],
+        lights=[light],
+        camera=camera,
+        render=RenderSettings(size=(32, 4), spp=256, max_depth=2, integrator=integrator),
+    )
     wi, solid_angle = disc(-unit(light.direction), 12.0, 256)
     points = pixel_points(camera, scene.render.size, 0.0)[0, :, :, 0]
     # A direction clears the edge if its slope is more than 4 over the distance to the wall.
@@ -156,19 +168,27 @@ def test_reflection_of_rough_metal(device: Device, roughness: float) -> None:
     light = sun((-0.6, -0.8, 0.0), 0.53)
     towards = -unit(light.direction)
     wi, solid_angle = disc(towards, 0.53, 1024)
-    turned = [0, 2, 1]    # to a frame whose z is the floor's normal
+    turned = [0, 2, 1]  # to a frame whose z is the floor's normal
     for off in (0.0, 0.2, 1.0):
         a = np.arctan2(0.6, 0.8) + np.radians(off)
         wo = np.array([-np.sin(a), np.cos(a), 0.0])
         x, y, _ = (10 * wo).tolist()
         camera = Camera(position=(x, y, 0.0), projection="orthographic", view_height=1.0)
-        scene = Scene(meshes=[replace(FLOOR, material=metal)], lights=[light], camera=camera,
-                      render=RenderSettings(size=(32, 32), spp=128, max_depth=2))
+        scene = Scene(
+            meshes=[replace(FLOOR, material=metal)],
+            lights=[light],
+            camera=camera,
+            render=RenderSettings(size=(32, 32), spp=128, max_depth=2),
+        )
         value = cook_torrance(metal, np.broadcast_to(wo, wi.shape)[:, turned], wi[:, turned])
         expected = np.sum(value * (wi[:, 1] * solid_angle)[:, None], axis=0) * light.radiance
         pixels = film(device, scene).mean.reshape(-1, 3)
-        p = mean_test(pixels.mean(axis=0), pixels.var(axis=0, ddof=1) + len(pixels) * (1e-4 * expected)**2, len(pixels),
-                      expected)
+        p = mean_test(
+            pixels.mean(axis=0),
+            pixels.var(axis=0, ddof=1) + len(pixels) * (1e-4 * expected) ** 2,
+            len(pixels),
+            expected,
+        )
         assert p.min() > sidak(FAMILY, 15 * 3), (off, pixels.mean(axis=0), expected)
 
 
@@ -178,14 +198,17 @@ def test_smooth_metal_has_little_noise(device: Device) -> None:
     for roughness in (0.02, 0.2):
         metal = MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness)
         camera = Camera(position=(-6.0, 8.0, 0.0), projection="orthographic", view_height=1.0)
-        scene = Scene(meshes=[replace(FLOOR, material=metal)], lights=[sun((-0.6, -0.8, 0.0), 0.53)], camera=camera,
-                      render=RenderSettings(size=(32, 32), spp=64, max_depth=2))
+        scene = Scene(
+            meshes=[replace(FLOOR, material=metal)],
+            lights=[sun((-0.6, -0.8, 0.0), 0.53)],
+            camera=camera,
+            render=RenderSettings(size=(32, 32), spp=64, max_depth=2),
+        )
         pixels = film(device, scene).mean
         noise[roughness] = pixels[..., 0].std() / pixels[..., 0].mean()
     assert noise[0.02] < 0.1 and noise[0.2] < 0.1, noise
 
 
 def test_a_point_compiles_no_disc(device: Device) -> None:
-    features = [Probe(device, Scene(lights=[sun((0.0, -1.0, 0.0), angle)])).compiled.features
-                for angle in (0.0, 0.53)]
+    features = [Probe(device, Scene(lights=[sun((0.0, -1.0, 0.0), angle)])).compiled.features for angle in (0.0, 0.53)]
     assert ("LIGHT_SUN" in features[0], "LIGHT_SUN" in features[1]) == (False, True)

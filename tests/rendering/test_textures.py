@@ -45,7 +45,7 @@ def plain(red: int, green: int, blue: int) -> Picture:
 def decoded(encoded: NDArray[np.uint8]) -> Doubles:
     """Decode sRGB by IEC 61966-2-1."""
     values = encoded / 255
-    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055)**2.4)
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
 
 
 def quad(material: Material, **corners: Any) -> Mesh:
@@ -55,9 +55,11 @@ def quad(material: Material, **corners: Any) -> Mesh:
 
 def seen(device: Device, scene: Scene, size: int = 32, spp: int = 16, **settings: Any) -> Doubles:
     """Return the image (size, size, 3) of [-1, 1]² at z = 0, from far above."""
-    scene = replace(scene, camera=Camera(position=(0, 0, 1000), look_at=(0, 0, 0),
-                                         fov_degrees=float(np.degrees(2 * np.arctan(1 / 1000)))),
-                    render=RenderSettings(size=(size, size), **settings))
+    scene = replace(
+        scene,
+        camera=Camera(position=(0, 0, 1000), look_at=(0, 0, 0), fov_degrees=float(np.degrees(2 * np.arctan(1 / 1000)))),
+        render=RenderSettings(size=(size, size), **settings),
+    )
     for state in Renderer(scene, spp=spp, device=device.info.index).passes(spp=spp):
         pass
     return state.film.mean
@@ -67,8 +69,10 @@ def seen(device: Device, scene: Scene, size: int = 32, spp: int = 16, **settings
 def test_texels_are_read_as_scipy_reads_them(device: Device, kind: Wrap) -> None:
     """Bilinear and nearest, every channel, across the edges, with several images in one scene."""
     pictures = [picture(1, 5, 7), picture(2, 1, 1), picture(3, 16, 2)]
-    textures = [Texture(picture=p, wrap=(kind, kind), filter=f, channel=c)
-                for p, f, c in itertools.product(pictures, FILTERS, get_args(Channel))]
+    textures = [
+        Texture(picture=p, wrap=(kind, kind), filter=f, channel=c)
+        for p, f, c in itertools.product(pictures, FILTERS, get_args(Channel))
+    ]
     users = [MetallicRoughness(color=texture, roughness=texture) for texture in textures]
     probe = Probe(device, Scene(spheres=[Sphere(material=user) for user in users]))
     records = probe.compiled.buffers["textures"][1]
@@ -83,8 +87,10 @@ def test_texels_are_read_as_scipy_reads_them(device: Device, kind: Wrap) -> None
             place = np.floor(place + 0.5)
         else:
             clear = np.ones(len(uv), bool)
-        channels = [*np.moveaxis(decoded(texels[..., :3]), 2, 0),
-                    texels[..., get_args(Channel).index(texture.channel)] / 255]
+        channels = [
+            *np.moveaxis(decoded(texels[..., :3]), 2, 0),
+            texels[..., get_args(Channel).index(texture.channel)] / 255,
+        ]
         expected = np.stack([map_coordinates(c, place, order=1, mode=MODES[kind]) for c in channels], axis=1)
         assert np.abs(found - expected)[clear].max() < 1e-5
 
@@ -92,8 +98,10 @@ def test_texels_are_read_as_scipy_reads_them(device: Device, kind: Wrap) -> None
 def test_a_picture_lies_upright_and_each_texel_fills_its_square(device: Device) -> None:
     """A diffuse surface under uniform white light shows exactly its own colors."""
     texels = picture(7, 8, 8)
-    scene = Scene(meshes=[quad(Diffuse(color=Texture(picture=texels, filter="nearest", factor=(1, 0.5, 0.25))))],
-                  environment=Environment(color=(1, 1, 1)))
+    scene = Scene(
+        meshes=[quad(Diffuse(color=Texture(picture=texels, filter="nearest", factor=(1, 0.5, 0.25))))],
+        environment=Environment(color=(1, 1, 1)),
+    )
     expected = np.kron(decoded(texels.texels[..., :3]) * (1, 0.5, 0.25), np.ones((4, 4, 1)))
     assert np.abs(seen(device, scene) - expected).max() < 1e-5
 
@@ -108,8 +116,9 @@ def test_pictures_are_moved_scaled_and_turned(device: Device, degrees: float, or
     texture = Texture(picture=Picture(texels), rotation_degrees=degrees, scale=(2, 2), offset=(3, -4), filter="nearest")
     scene = Scene(meshes=[quad(Diffuse(color=texture))], environment=Environment(color=(1, 1, 1)))
     found = seen(device, scene, spp=4)[..., 0]
-    expected = np.kron(np.tile(decoded(np.reshape([colors[n] for n in order], (2, 2)).astype(np.uint8)), (2, 2)),
-                       np.ones((8, 8)))
+    expected = np.kron(
+        np.tile(decoded(np.reshape([colors[n] for n in order], (2, 2)).astype(np.uint8)), (2, 2)), np.ones((8, 8))
+    )
     assert np.abs(found - expected).max() < 1e-5
 
 
@@ -117,12 +126,18 @@ def test_second_set_of_coordinates_and_numbers(device: Device) -> None:
     """One material with a color from the first UV set and a metallic texture from the second."""
     color, metal = picture(8, 4, 4), Picture(np.zeros((1, 2, 4), np.uint8))
     metal.texels[0, 1, 2] = 255
-    material = MetallicRoughness(color=Texture(picture=color, filter="nearest"), roughness=1.0, preset=None,
-                                 metallic=Texture(picture=metal, channel="blue", uv_set=1, filter="nearest"))
+    material = MetallicRoughness(
+        color=Texture(picture=color, filter="nearest"),
+        roughness=1.0,
+        preset=None,
+        metallic=Texture(picture=metal, channel="blue", uv_set=1, filter="nearest"),
+    )
     # The textured quad is behind each of them, so that every image runs the same program.
     both = quad(material, uv1=UV[:, ::-1], vertices=(QUAD - (0, 0, 1)).astype(np.float32))
-    scene, *plain_ones = [Scene(meshes=[quad(each, uv1=UV[:, ::-1]), both], environment=Environment(color=(1, 1, 1)))
-                          for each in (material, replace(material, metallic=0.0), replace(material, metallic=1.0))]
+    scene, *plain_ones = [
+        Scene(meshes=[quad(each, uv1=UV[:, ::-1]), both], environment=Environment(color=(1, 1, 1)))
+        for each in (material, replace(material, metallic=0.0), replace(material, metallic=1.0))
+    ]
     found, body, metallic = (seen(device, each) for each in (scene, *plain_ones))
     assert np.abs(body - metallic).mean() > 0.02
     assert np.array_equal(found[:16], body[:16]) and np.array_equal(found[16:], metallic[16:])
@@ -131,8 +146,10 @@ def test_second_set_of_coordinates_and_numbers(device: Device) -> None:
 def test_vertex_colors_multiply(device: Device) -> None:
     """They are linear over each triangle, so a pixel's mean is the value at its centre."""
     colors = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
-    scene = Scene(meshes=[quad(Diffuse(color=(0.5, 0.25, 1)), colors=colors), quad(Diffuse())],
-                  environment=Environment(color=(1, 1, 1)))
+    scene = Scene(
+        meshes=[quad(Diffuse(color=(0.5, 0.25, 1)), colors=colors), quad(Diffuse())],
+        environment=Environment(color=(1, 1, 1)),
+    )
     scene.meshes[1].vertices = (QUAD - (0, 0, 1)).astype(np.float32)
     middle = (np.arange(32) + 0.5) / 32
     found = seen(device, scene, spp=64)
@@ -143,8 +160,10 @@ def test_vertex_colors_multiply(device: Device) -> None:
 
 #: Texture transforms: none, rotated and scaled, mirrored.
 PLACED: dict[str, dict[str, Any]] = {
-    "plain": {}, "turned": {"rotation_degrees": 30.0, "scale": (2.0, 0.7)},
-    "mirrored": {"rotation_degrees": -75.0, "scale": (-1.3, 0.8), "offset": (0.3, 0.1)}}
+    "plain": {},
+    "turned": {"rotation_degrees": 30.0, "scale": (2.0, 0.7)},
+    "mirrored": {"rotation_degrees": -75.0, "scale": (-1.3, 0.8), "offset": (0.3, 0.1)},
+}
 
 
 def image_axes(texture: Texture, along_u: Doubles, along_v: Doubles, normal: Doubles) -> tuple[Doubles, Doubles]:
@@ -155,10 +174,17 @@ def image_axes(texture: Texture, along_u: Doubles, along_v: Doubles, normal: Dou
     return right, up if up @ by_y < 0 else -up
 
 
-@covering("shape, mirrored, turn, placed", ["flat", "smooth", "own tangents"], [False, True], [0.0, 40.0, 90.0, 200.0],
-          list(PLACED), strength=2)
-def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrored: bool, shape: str,
-                                            placed: str) -> None:
+@covering(
+    "shape, mirrored, turn, placed",
+    ["flat", "smooth", "own tangents"],
+    [False, True],
+    [0.0, 40.0, 90.0, 200.0],
+    list(PLACED),
+    strength=2,
+)
+def test_normal_maps_tilt_along_the_picture(
+    device: Device, turn: float, mirrored: bool, shape: str, placed: str
+) -> None:
     """Red tilts the normal to the image's right and green to its top, for any orientation on the
     surface: light from there has the cosine to the bent normal, with bump shadowing. A mesh's own
     tangents are those of the transformed image."""
@@ -177,9 +203,10 @@ def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrore
     cosine = bent @ towards / np.linalg.norm(bent) / np.linalg.norm(towards)
     normals = np.tile(np.array([0, 0, 1], np.float32), (4, 1)) if shape != "flat" else None
     own = np.tile(np.array([*right, -1 if mirrored else 1], np.float32), (4, 1)) if shape == "own tangents" else None
-    scene = Scene(meshes=[quad(Diffuse(color=(0.8, 0.8, 0.8), normal_map=texture), uv=uv, normals=normals,
-                               tangents=own)],
-                  lights=[DirectionalLight(direction=tuple(-towards), irradiance=(1, 1, 1))])
+    scene = Scene(
+        meshes=[quad(Diffuse(color=(0.8, 0.8, 0.8), normal_map=texture), uv=uv, normals=normals, tangents=own)],
+        lights=[DirectionalLight(direction=tuple(-towards), irradiance=(1, 1, 1))],
+    )
     found = seen(device, scene, size=8, spp=4, max_depth=2)
     left = bump_shadowing(np.array([0.0, 0.0, 1.0]), bent, towards)
     assert found.mean() == pytest.approx(0.8 / np.pi * cosine * left, rel=1e-4)
@@ -196,9 +223,11 @@ def test_normal_maps_tilt_along_the_picture_on_spheres(device: Device, placed: s
     texture = Texture(picture=plain(*texel), **PLACED[placed])
     right, up = image_axes(texture, along_u, along_v, normal)
     bent = np.stack([right, up, normal], axis=1) @ (texel / 255 * 2 - 1)
-    scene = Scene(spheres=[Sphere(material=Diffuse(normal_map=texture))],
-                  camera=Camera(position=tuple(3 * normal), look_at=(0.0, 0.0, 0.0), fov_degrees=0.01),
-                  render=RenderSettings(size=(4, 4), integrator="normals"))
+    scene = Scene(
+        spheres=[Sphere(material=Diffuse(normal_map=texture))],
+        camera=Camera(position=tuple(3 * normal), look_at=(0.0, 0.0, 0.0), fov_degrees=0.01),
+        render=RenderSettings(size=(4, 4), integrator="normals"),
+    )
     *_, last = Renderer(scene, spp=4, device=device.info.index).passes(spp=4)
     np.testing.assert_allclose(last.film.mean.mean(axis=(0, 1)), bent / np.linalg.norm(bent), atol=2e-4)
 
@@ -226,15 +255,21 @@ def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: Lanes, cu
     above = (QUAD * (1, 1, 0) + (0, 1, 1))[:, [0, 2, 1]]
     ground = Mesh((QUAD * 9)[:, [0, 2, 1]].astype(np.float32), FACES[:, ::-1].copy(), Diffuse(color=(0.8, 0.8, 0.8)))
     glow = (5.0, 5.0, 5.0)
-    material = (Diffuse(color=BLACK, emission=glow, opacity=Texture(picture=half, filter="nearest")) if cut else
-                Diffuse(color=BLACK, emission=Texture(picture=half, factor=5.0, filter="nearest")))
+    material = (
+        Diffuse(color=BLACK, emission=glow, opacity=Texture(picture=half, filter="nearest"))
+        if cut
+        else Diffuse(color=BLACK, emission=Texture(picture=half, factor=5.0, filter="nearest"))
+    )
     painted = Mesh(above.astype(np.float32), FACES, material, uv=UV)
     right = np.where(UV[:, :1] == 0, above * (0, 1, 1), above)
     small = Mesh(right.astype(np.float32), FACES, Diffuse(color=BLACK, emission=glow))
     pictures = []
     for lamp in (painted, small):
-        scene = Scene(meshes=[ground, lamp], camera=Camera(position=(0, 0.5, 8), look_at=(0, 0.5, 0)),
-                      render=RenderSettings(size=(24, 24), max_depth=3))
+        scene = Scene(
+            meshes=[ground, lamp],
+            camera=Camera(position=(0, 0.5, 8), look_at=(0, 0.5, 0)),
+            render=RenderSettings(size=(24, 24), max_depth=3),
+        )
         renderer = Renderer(scene, spp=256, device=device.info.index, lanes=lanes if lamp is painted else 8)
         for state in renderer.passes(spp=256):
             pass

@@ -65,18 +65,27 @@ def stack(kind: str, count: int, apart: float) -> Scene:
     return Scene(meshes=[quad(60, height, nth(count)) for height in heights])
 
 
-def over_ground(scene: Scene, integrator: Integrator, rotation: Doubles = UPRIGHT,
-                sun: DirectionalLight = SUN) -> Scene:
+def over_ground(
+    scene: Scene, integrator: Integrator, rotation: Doubles = UPRIGHT, sun: DirectionalLight = SUN
+) -> Scene:
     """Return the scene above a sunlit ground, seen from below the stack; everything is rotated."""
     ground = quad(5, 0.0, Diffuse(color=(0.5, 0.5, 0.5)))
-    camera = Camera(position=tuple((rotation @ [0, 0, 5.0]).tolist()), look_at=(0.0, 0.0, 0.0),
-                    up=tuple((rotation @ [0, 1.0, 0]).tolist()), fov_degrees=30.0)
+    camera = Camera(
+        position=tuple((rotation @ [0, 0, 5.0]).tolist()),
+        look_at=(0.0, 0.0, 0.0),
+        up=tuple((rotation @ [0, 1.0, 0]).tolist()),
+        fov_degrees=30.0,
+    )
     return replace(
-        scene, camera=camera, lights=[replace(sun, direction=tuple((rotation @ sun.direction).tolist()))],
-        meshes=[replace(mesh, vertices=(mesh.vertices @ rotation.T).astype(np.float32))
-                for mesh in [*scene.meshes, ground]],
+        scene,
+        camera=camera,
+        lights=[replace(sun, direction=tuple((rotation @ sun.direction).tolist()))],
+        meshes=[
+            replace(mesh, vertices=(mesh.vertices @ rotation.T).astype(np.float32)) for mesh in [*scene.meshes, ground]
+        ],
         instances=[replace(each, to_world=rotation @ each.to_world) for each in scene.instances],
-        render=RenderSettings(size=(8, 8), spp=1, max_depth=2, integrator=integrator))
+        render=RenderSettings(size=(8, 8), spp=1, max_depth=2, integrator=integrator),
+    )
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.01])
@@ -104,8 +113,9 @@ def test_spheres(device: Device, integrator: Integrator, count: int) -> None:
     """A ray enters and leaves each, concentric or coincident; up to 16 are not in the BVH."""
     sun = replace(SUN, direction=(-1.0, -0.3, -1.0))
     for step in (0.0, 0.01):
-        spheres = [Sphere(center=(100.0, 30.0, 100.0), radius=70 + step * i, material=nth(2 * count))
-                   for i in range(count)]
+        spheres = [
+            Sphere(center=(100.0, 30.0, 100.0), radius=70 + step * i, material=nth(2 * count)) for i in range(count)
+        ]
         found = film(device, over_ground(Scene(spheres=spheres), integrator, sun=sun)).mean
         assert found == pytest.approx(STACK * RADIANCE, rel=3e-4), step
 

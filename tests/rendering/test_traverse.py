@@ -61,7 +61,7 @@ def test_closed_mesh_has_no_cracks(device: Device, layout: str, offset: float) -
     probe = Probe(device, Scene(meshes=[Mesh(vertices, faces)]), layout=layout)
     found = probe("closest_hit", 4, probe.compiled.frame.points(origin), target - origin)
     assert np.count_nonzero(found[:, 3] < 0) == 0
-    assert np.abs(found[:, 0] - 1).max() < 0.01 + offset * 1e-6   # A facet is flatter than the sphere by 1e-4
+    assert np.abs(found[:, 0] - 1).max() < 0.01 + offset * 1e-6  # A facet is flatter than the sphere by 1e-4
 
 
 @pytest.mark.parametrize(("layout", "builder"), [*TREES, ("packs", "sah"), ("list", "sah")])
@@ -115,8 +115,10 @@ def test_ties_are_broken_alike(device: Device, kind: str) -> None:
         repeated = balls(np.repeat(spheres(10), 8, axis=0))
         scene = Scene(meshes=[mesh(triangles)], spheres=repeated if kind == "mixed" else [])
         origin, direction = random_rays(20_000, 6)
-    found = {tree: Probe(device, scene, layout=tree[0], builder=tree[1])("closest_hit", 4, origin, direction)
-             for tree in (*TREES, ("packs", "sah"), ("list", "sah"))}
+    found = {
+        tree: Probe(device, scene, layout=tree[0], builder=tree[1])("closest_hit", 4, origin, direction)
+        for tree in (*TREES, ("packs", "sah"), ("list", "sah"))
+    }
     reference = found.pop(("list", "sah"))
     for tree, hits in found.items():
         differ = np.any(hits != reference, axis=1)
@@ -141,7 +143,7 @@ def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
         listed = no_tree("closest_hit", 4, origin * [1, side, 1], down)
         lost.append(np.count_nonzero(found[:, 0] != 1.5))
         other.append(np.count_nonzero(found[:, 3] != listed[:, 3]))
-    assert not any(lost + other), (lost, other)   # of 10 201 each
+    assert not any(lost + other), (lost, other)  # of 10 201 each
     # In the plane itself, along an axis or across: neither a hit nor a hang.
     inside = origin * [1, 0, 1]
     for along in ([1.0, 0.0, 0.0], [0.0, -0.0, -1.0], [0.6, 0.0, 0.8]):
@@ -174,8 +176,13 @@ def test_any_hit_is_a_closest_hit_before_t_max(device: Device, layout: str) -> N
     hit = np.isfinite(t)
     assert 0.2 < np.mean(hit) < 0.98
     limits: dict[str, NDArray[np.floating]] = {
-        "infinite": np.full_like(t, np.inf), "half": t / 2, "double": 2 * t, "at": t,
-        "before": np.nextafter(t, np.float32(0)), "behind": np.nextafter(t, np.float32(np.inf))}
+        "infinite": np.full_like(t, np.inf),
+        "half": t / 2,
+        "double": 2 * t,
+        "at": t,
+        "before": np.nextafter(t, np.float32(0)),
+        "behind": np.nextafter(t, np.float32(np.inf)),
+    }
     blocked = {name: probe("any_hit", 1, origin, direction, limit)[:, 0] > 0 for name, limit in limits.items()}
     wrong = {name: np.count_nonzero(blocked[name] != (hit & (t < limit))) for name, limit in limits.items()}
     assert not any(wrong.values()), wrong
@@ -197,8 +204,8 @@ def test_scaled_mesh_has_the_same_hits(device: Device, layout: str, scale: float
 
 @covering("layout, length", LAYOUTS, [2.0**-30, 2.0**30, 2.0**-10, 2.0**10])
 def test_length_of_the_direction_does_not_matter(device: Device, layout: str, length: float) -> None:
-    """t is in multiples of the direction; shadow rays have the vector to their light as direction, in any scene unit.
-    """
+    """t is in multiples of the direction; shadow rays have the vector to their light as direction, in any scene
+    unit."""
     scene = Scene(meshes=[mesh(soup(300, 0.3))], spheres=balls(spheres(20)))
     origin, direction = random_rays(10_000, 10)
     probe = Probe(device, scene, layout=layout)
@@ -231,13 +238,20 @@ for layout in {LAYOUTS}:
     assert done.returncode == 0, f"exit status {done.returncode}\n{done.stderr[-500:]}"
 
 
-@pytest.mark.parametrize(("layout", "triangles", "other"), [
-    ("bvh8", 2000, "PORTABLE_MASK 1"), ("packs", 60, "WIDTH 8"),
-    *others(("packs", 60, "PORTABLE_MASK 1"), ("packs", 60, "WIDTH 16"))])
+@pytest.mark.parametrize(
+    ("layout", "triangles", "other"),
+    [
+        ("bvh8", 2000, "PORTABLE_MASK 1"),
+        ("packs", 60, "WIDTH 8"),
+        *others(("packs", 60, "PORTABLE_MASK 1"), ("packs", 60, "WIDTH 16")),
+    ],
+)
 def test_other_instructions_give_the_same_hits(device: Device, layout: str, triangles: int, other: str) -> None:
     """Gathering mask bits by multiplication if there is no instruction for it, and packs of another width."""
     scene = Scene(meshes=[mesh(soup(triangles, 0.1))], spheres=balls(spheres(50)))
     origin, direction = random_rays(50_000, 8)
-    hits, others = (Probe(device, scene, defines, layout=layout, lanes=8)("closest_hit", 4, origin, direction)
-                    for defines in ("", f"#define {other}"))
+    hits, others = (
+        Probe(device, scene, defines, layout=layout, lanes=8)("closest_hit", 4, origin, direction)
+        for defines in ("", f"#define {other}")
+    )
     assert np.array_equal(hits, others)

@@ -19,14 +19,19 @@ pytestmark = pytest.mark.statistics
 LAMP = Diffuse(emission=(1.0, 1.0, 1.0))
 
 
-@pytest.mark.parametrize(("corners", "joined"), [
-    ([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], True),
-    ([(0, 0, 0), (2, 0, 0), (3, 1, 1), (1, 1, 1)], True),
-    ([(0.1, 0.7, 0.3), (1.4, 0.7, 0.3), (1.4, 2.3, 0.3), (0.1, 2.3, 0.3)], True),
-    ([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 2, 0)], False),
-    ([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.01)], False)])
-def test_two_triangles_of_a_parallelogram_are_one_light(device: Device, corners: list[tuple[float, float, float]],
-                                                        joined: bool) -> None:
+@pytest.mark.parametrize(
+    ("corners", "joined"),
+    [
+        ([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], True),
+        ([(0, 0, 0), (2, 0, 0), (3, 1, 1), (1, 1, 1)], True),
+        ([(0.1, 0.7, 0.3), (1.4, 0.7, 0.3), (1.4, 2.3, 0.3), (0.1, 2.3, 0.3)], True),
+        ([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 2, 0)], False),
+        ([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.01)], False),
+    ],
+)
+def test_two_triangles_of_a_parallelogram_are_one_light(
+    device: Device, corners: list[tuple[float, float, float]], joined: bool
+) -> None:
     """For any numbering of its faces, but not across meshes, nor if one is flipped."""
     for diagonal in (0, 1):
         for turn in np.ndindex(3, 3):

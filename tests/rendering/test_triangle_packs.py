@@ -18,8 +18,12 @@ from .test_traverse import mesh
 Doubles = NDArray[np.float64]
 ROOM = box([-1, 0, -1], [7, 8, 7])
 #: Three boxes on a room's floor, the room, a box below it, and a room that fills a pack: all have sides at y = 0.
-PARTS = (*(box([2 * x, 0, 0], [2 * x + 1, 1, 1]) for x in range(3)), ROOM, box([-1, -1, -1], [7, 0, 7]),
-         np.concatenate([ROOM, ROOM[:4]]))
+PARTS = (
+    *(box([2 * x, 0, 0], [2 * x + 1, 1, 1]) for x in range(3)),
+    ROOM,
+    box([-1, -1, -1], [7, 0, 7]),
+    np.concatenate([ROOM, ROOM[:4]]),
+)
 
 
 def rays_at(seed: int) -> tuple[Doubles, Doubles]:
@@ -50,8 +54,8 @@ def test_hits_are_those_of_all_triangles(device: Device, order: tuple[int, ...],
 
 @pytest.mark.parametrize("layout", TREES)
 def test_length_of_directions_changes_only_t(device: Device, layout: str) -> None:
-    """Rays that start on or just above a floor and leave it, scaled by powers of two, so that all digits are preserved.
-    """
+    """Rays that start on or just above a floor and leave it, scaled by powers of two, so that all digits are
+    preserved."""
     scene = Scene(meshes=[mesh(np.concatenate([PARTS[0], PARTS[3]]))])
     rng = np.random.default_rng(2)
     origin, direction = rng.uniform(0, 7, (40_000, 3)), rng.normal(size=(40_000, 3))

@@ -34,28 +34,33 @@ Doubles = NDArray[np.float64]
 
 
 def everything() -> Scene:
-    """Return a scene with all kinds of primitives, materials and lights, of an odd width that leaves SIMD lanes empty.
-    """
+    """Return a scene with all kinds of primitives, materials and lights, of an odd width that leaves SIMD lanes
+    empty."""
     vertices, faces = rays.icosphere(2)
     gold = MetallicRoughness(preset="gold", roughness=0.4, multiple_scattering=True)
     plastic = MetallicRoughness(roughness=0.2, smith="schlick")
     ball = Mesh(vertices + np.array([1.2, 0.8, 0], np.float32), faces, gold, normals=vertices)
     lamp = quad([(-1, 4, -1), (1, 4, -1), (1, 4, 1), (-1, 4, 1)], Diffuse(emission=(6.0, 5.0, 4.0)))
     floor = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(0.7, 0.6, 0.5)))
-    sky = (2 * np.random.default_rng(0).random((8, 16, 1))**6 * [1.0, 0.8, 0.6]).astype(np.float32)
+    sky = (2 * np.random.default_rng(0).random((8, 16, 1)) ** 6 * [1.0, 0.8, 0.6]).astype(np.float32)
     return Scene(
         meshes=[floor, lamp, ball],
-        spheres=[Sphere(center=(-1.0, 0.7, 0.5), radius=0.7, material=Mirror(color=(0.9, 0.9, 0.9))),
-                 Sphere(center=(0.0, 2.2, 0.0), radius=0.2, material=Diffuse(emission=(9.0, 1.0, 1.0))),
-                 Sphere(center=(0.0, 0.3, 1.5), radius=0.3, material=plastic),
-                 Sphere(center=(0.7, 0.35, 2.0), radius=0.35, material=Dielectric())],
-        lights=[PointLight(position=(3.0, 2.0, 2.0), intensity=(5.0, 5.0, 9.0)),
-                DirectionalLight(direction=(1.0, -2.0, -1.0), irradiance=(0.5, 0.4, 0.3)),
-                DirectionalLight(direction=(-1.0, -2.0, -1.0), irradiance=(0.2, 0.3, 0.4), angle_degrees=20.0),
-                SpotLight(position=(-3.0, 3.0, 2.0), direction=(1.0, -1.0, -0.5), intensity=(9.0, 9.0, 5.0))],
+        spheres=[
+            Sphere(center=(-1.0, 0.7, 0.5), radius=0.7, material=Mirror(color=(0.9, 0.9, 0.9))),
+            Sphere(center=(0.0, 2.2, 0.0), radius=0.2, material=Diffuse(emission=(9.0, 1.0, 1.0))),
+            Sphere(center=(0.0, 0.3, 1.5), radius=0.3, material=plastic),
+            Sphere(center=(0.7, 0.35, 2.0), radius=0.35, material=Dielectric()),
+        ],
+        lights=[
+            PointLight(position=(3.0, 2.0, 2.0), intensity=(5.0, 5.0, 9.0)),
+            DirectionalLight(direction=(1.0, -2.0, -1.0), irradiance=(0.5, 0.4, 0.3)),
+            DirectionalLight(direction=(-1.0, -2.0, -1.0), irradiance=(0.2, 0.3, 0.4), angle_degrees=20.0),
+            SpotLight(position=(-3.0, 3.0, 2.0), direction=(1.0, -1.0, -0.5), intensity=(9.0, 9.0, 5.0)),
+        ],
         environment=Environment(image=sky, rotation_degrees=30.0),
         camera=Camera(position=(0.0, 2.0, 6.0), look_at=(0.0, 1.0, 0.0)),
-        render=RenderSettings(size=(45, 33), spp=4, max_depth=6, seed=11))
+        render=RenderSettings(size=(45, 33), spp=4, max_depth=6, seed=11),
+    )
 
 
 def painted(scene: Scene) -> Scene:
@@ -64,16 +69,36 @@ def painted(scene: Scene) -> Scene:
     here = Texture(picture=Picture(texels))
     there = Texture(picture=Picture(texels[1:4]), uv_set=1, wrap=("mirror", "clamp"))
     floor, lamp, ball = scene.meshes
-    gold = MetallicRoughness(color=there, metallic=here, roughness=replace(here, channel="green", filter="nearest"),
-                             normal_map=here, opacity=replace(here, channel="alpha"), clearcoat=there,
-                             clearcoat_roughness=0.3, clearcoat_normal_map=there)
+    gold = MetallicRoughness(
+        color=there,
+        metallic=here,
+        roughness=replace(here, channel="green", filter="nearest"),
+        normal_map=here,
+        opacity=replace(here, channel="alpha"),
+        clearcoat=there,
+        clearcoat_roughness=0.3,
+        clearcoat_normal_map=there,
+    )
     flat = floor.vertices[:, [0, 2]]
-    meshes = [replace(floor, material=Diffuse(color=here, alpha_cutoff=0.3, opacity=there), uv=flat,
-                      uv1=flat[:, ::-1].copy(), colors=np.linspace(0, 1, 16, dtype=np.float32).reshape(4, 4)),
-              replace(lamp, material=Diffuse(emission=replace(here, factor=6.0)), uv=lamp.vertices[:, [0, 2]]),
-              replace(ball, material=gold, uv=ball.vertices[:, :2].copy(), uv1=ball.vertices[:, 1:].copy())]
-    spheres = [*scene.spheres, Sphere(center=(2.0, 0.4, 2.0), radius=0.3,
-                                      material=Diffuse(color=here, emission=there, normal_map=there, one_sided=True))]
+    meshes = [
+        replace(
+            floor,
+            material=Diffuse(color=here, alpha_cutoff=0.3, opacity=there),
+            uv=flat,
+            uv1=flat[:, ::-1].copy(),
+            colors=np.linspace(0, 1, 16, dtype=np.float32).reshape(4, 4),
+        ),
+        replace(lamp, material=Diffuse(emission=replace(here, factor=6.0)), uv=lamp.vertices[:, [0, 2]]),
+        replace(ball, material=gold, uv=ball.vertices[:, :2].copy(), uv1=ball.vertices[:, 1:].copy()),
+    ]
+    spheres = [
+        *scene.spheres,
+        Sphere(
+            center=(2.0, 0.4, 2.0),
+            radius=0.3,
+            material=Diffuse(color=here, emission=there, normal_map=there, one_sided=True),
+        ),
+    ]
     return replace(scene, meshes=meshes, spheres=spheres)
 
 
@@ -81,10 +106,16 @@ def shelf() -> Scene:
     """Return a small sphere of each material in each of its variants, in rows."""
     materials = [material for kind in MATERIALS for material in variants(kind)]
     across = int(np.ceil(np.sqrt(len(materials))))
-    spheres = [Sphere(center=(i % across - across / 2, i // across - across / 2, 0.0), radius=0.45, material=material)
-               for i, material in enumerate(materials)]
-    return replace(everything(), meshes=[], spheres=spheres,
-                   camera=Camera(position=(0, 0, 3.0 * across), look_at=(0, 0, 0), fov_degrees=20))
+    spheres = [
+        Sphere(center=(i % across - across / 2, i // across - across / 2, 0.0), radius=0.45, material=material)
+        for i, material in enumerate(materials)
+    ]
+    return replace(
+        everything(),
+        meshes=[],
+        spheres=spheres,
+        camera=Camera(position=(0, 0, 3.0 * across), look_at=(0, 0, 0), fov_degrees=20),
+    )
 
 
 def planted(scene: Scene) -> Scene:
@@ -130,8 +161,9 @@ def test_lanes_and_layouts_agree(device: Device, reference: Doubles, layout: str
     assert_most_agree(film(device, everything(), lanes=lanes, layout=layout).mean, reference)
 
 
-@pytest.mark.parametrize("chosen", [{"layout": None, "tree": False}, {"layout": "bvh8", "builder": "midpoint"}],
-                         ids=str)
+@pytest.mark.parametrize(
+    "chosen", [{"layout": None, "tree": False}, {"layout": "bvh8", "builder": "midpoint"}], ids=str
+)
 def test_builders_agree(device: Device, reference: Doubles, chosen: dict[str, Any]) -> None:
     """As above; also without a BVH."""
     assert_most_agree(film(device, everything(), lanes=8, **chosen).mean, reference)
@@ -152,8 +184,9 @@ def test_lanes_agree_on_textures_and_holes(device: Device, lanes: int, layout: s
     assert expected.mean() > 0.1 and np.mean(differs) < 4e-3, np.argwhere(differs)
 
 
-def test_spheres_in_the_tree_and_out_of_it_agree(device: Device, reference: Doubles,
-                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+def test_spheres_in_the_tree_and_out_of_it_agree(
+    device: Device, reference: Doubles, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As above; few spheres are tested before the BVH, many in it (test_parts.py has them in every layout)."""
     assert "LONE_SPHERES" in session(device, everything(), layout="bvh8").compiled.features
     monkeypatch.setattr(pack_module, "FEW_SPHERES", 0)
@@ -198,8 +231,9 @@ def test_a_tree_can_be_wanted_or_not() -> None:
 def test_seeds_differ(device: Device) -> None:
     """Another seed gives other noise: images of independent samples differ in nearly all pixels with noise."""
     scene = everything()
-    pictures = [film(device, replace(scene, render=replace(scene.render, seed=seed))).mean
-                for seed in (0, 1, 2**32 - 1)]
+    pictures = [
+        film(device, replace(scene, render=replace(scene.render, seed=seed))).mean for seed in (0, 1, 2**32 - 1)
+    ]
     for i, j in ((0, 1), (0, 2), (1, 2)):
         assert np.mean(np.any(pictures[i] != pictures[j], axis=2)) > 0.95
         mean = [p.mean() for p in (pictures[i], pictures[j])]
@@ -219,8 +253,14 @@ def test_empty_scene_is_the_sky(device: Device) -> None:
 def test_a_scene_compiles_to_what_it_needs(device: Device, layout: str) -> None:
     """Files, features and buffers of a scene of spheres, of one of triangles, and of an empty one."""
     triangle = quad([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], Diffuse())
-    compiled = {name: compile_scene(scene, choices(device, layout=layout)) for name, scene in
-                {"spheres": Scene(spheres=[Sphere()]), "triangles": Scene(meshes=[triangle]), "empty": Scene()}.items()}
+    compiled = {
+        name: compile_scene(scene, choices(device, layout=layout))
+        for name, scene in {
+            "spheres": Scene(spheres=[Sphere()]),
+            "triangles": Scene(meshes=[triangle]),
+            "empty": Scene(),
+        }.items()
+    }
     assert "geometry/sphere.cl" in compiled["spheres"].files
     assert "geometry/triangle_watertight.cl" in compiled["triangles"].files
     for name, unwanted in {"spheres": "triangle", "triangles": "sphere"}.items():
@@ -239,8 +279,9 @@ def test_a_scene_compiles_to_what_it_needs(device: Device, layout: str) -> None:
     assert not [file for file in compiled["empty"].files if file.startswith(trees)]
 
 
-@pytest.mark.parametrize("kind, known", {
-    "triangle": TRIANGLE_TESTS, "box": BOX_TESTS, "sphere": SPHERE_TESTS, "offset": OFFSETS}.items())
+@pytest.mark.parametrize(
+    "kind, known", {"triangle": TRIANGLE_TESTS, "box": BOX_TESTS, "sphere": SPHERE_TESTS, "offset": OFFSETS}.items()
+)
 def test_of_each_test_one_is_compiled(device: Device, kind: str, known: dict[str, str]) -> None:
     """Only the chosen file is compiled; by default the first of each kind."""
     default = compile_scene(everything(), choices(device))
@@ -263,7 +304,10 @@ def test_other_tests_make_much_the_same_picture(device: Device, reference: Doubl
 def test_settings_do_not_change_the_program(device: Device) -> None:
     """Camera, size, samples, depth, seed and all numbers of the scene are kernel arguments."""
     scene = everything()
-    other = replace(scene, camera=Camera(position=(1.0, 1.0, 9.0), fov_degrees=70.0),
-                    render=RenderSettings(size=(7, 5), spp=3, max_depth=2, seed=99),
-                    lights=[PointLight(position=(0.0, 9.0, 0.0), intensity=(1.0, 2.0, 3.0)), *scene.lights[1:]])
+    other = replace(
+        scene,
+        camera=Camera(position=(1.0, 1.0, 9.0), fov_degrees=70.0),
+        render=RenderSettings(size=(7, 5), spp=3, max_depth=2, seed=99),
+        lights=[PointLight(position=(0.0, 9.0, 0.0), intensity=(1.0, 2.0, 3.0)), *scene.lights[1:]],
+    )
     assert session(device, scene).compiled.source == session(device, other).compiled.source

@@ -21,16 +21,18 @@ from ..covering import others
 from .pictures import session
 from .test_variants import everything, painted, plastic_ball, sights
 
-SPP = 7   # not a multiple of a wave's samples
+SPP = 7  # not a multiple of a wave's samples
 
 PAINTED = painted(everything())
 #: Most share one program.
-SCENES = {"painted": PAINTED,
-          "too bright": replace(PAINTED, environment=replace(PAINTED.environment, strength=1e38)),
-          "two edges": replace(PAINTED, render=replace(PAINTED.render, max_depth=2)),
-          "one edge": replace(PAINTED, render=replace(PAINTED.render, max_depth=1)),
-          "a pixel": replace(PAINTED, render=replace(PAINTED.render, size=(1, 1))),
-          "sky": replace(everything(), meshes=[], spheres=[])}
+SCENES = {
+    "painted": PAINTED,
+    "too bright": replace(PAINTED, environment=replace(PAINTED.environment, strength=1e38)),
+    "two edges": replace(PAINTED, render=replace(PAINTED.render, max_depth=2)),
+    "one edge": replace(PAINTED, render=replace(PAINTED.render, max_depth=1)),
+    "a pixel": replace(PAINTED, render=replace(PAINTED.render, size=(1, 1))),
+    "sky": replace(everything(), meshes=[], spheres=[]),
+}
 PLASTIC = plastic_ball()
 OTHERS = {"everything": everything(), "lens": dict(sights(everything()))["lens"]}
 
@@ -64,8 +66,9 @@ def test_waves_are_the_same_paths(device: Device, name: str) -> None:
     assert_same(waves, lanes)
 
 
-@pytest.mark.parametrize("chosen", [{"sampler": "sobol", "layout": "bvh8"},
-                                    {"sampler": "stratified", "direct_light": True}], ids=str)
+@pytest.mark.parametrize(
+    "chosen", [{"sampler": "sobol", "layout": "bvh8"}, {"sampler": "stratified", "direct_light": True}], ids=str
+)
 def test_waves_with_every_choice(device: Device, chosen: dict[str, Any]) -> None:
     lanes, waves = (followed(device, paths, PLASTIC, **chosen) for paths in ("lanes", "waves"))
     assert ("direct" in (waves.pixels.dtype.names or ())) == ("direct_light" in chosen)

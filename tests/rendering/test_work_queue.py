@@ -17,14 +17,19 @@ def test_samples_come_once_and_in_their_order(seed: int) -> None:
     in_flight: list[WorkPart] = []
     for step in range(4):
         if step % 2:
-            work.double(rng.permutation(35)[:rng.integers(1, 36)])
+            work.double(rng.permutation(35)[: rng.integers(1, 36)])
         else:
             work = WorkQueue(np.full((5, 7), done.max()))
             done[:] = done.max()
             work.add_to_all(int(rng.integers(1, 40)))
         while work.parts or in_flight:
-            share = work.cut(int(rng.integers(0, 200)), int(rng.integers(1, 9)), int(rng.integers(9, 40)),
-                             int(rng.integers(1, 60)), in_flight)
+            share = work.cut(
+                int(rng.integers(0, 200)),
+                int(rng.integers(1, 9)),
+                int(rng.integers(9, 40)),
+                int(rng.integers(1, 60)),
+                in_flight,
+            )
             assert share is not None or in_flight
             in_flight += [share] if share else []
             if not share or rng.random() < 0.5:
@@ -32,7 +37,7 @@ def test_samples_come_once_and_in_their_order(seed: int) -> None:
                 if rng.random() < 0.2:
                     work.give_back(ended)
                     continue
-                tiles = work.tiles[ended.first:ended.end]
+                tiles = work.tiles[ended.first : ended.end]
                 assert np.all(done[tiles] == ended.samples)
                 done[tiles] += ended.more
         work.settle()
@@ -50,15 +55,24 @@ def test_what_was_lost_is_in_hand_again(seed: int) -> None:
     while not np.array_equal(work.samples, expected):
         for _ in range(int(rng.integers(1, 4))):
             if (share := work.cut(int(rng.integers(0, 20)), int(rng.integers(1, 9)))) and rng.random() < 0.5:
-                done[work.tiles[share.first:share.end]] += share.more * (done[work.tiles[share.first:share.end]]
-                                                                         == share.samples)
+                done[work.tiles[share.first : share.end]] += share.more * (
+                    done[work.tiles[share.first : share.end]] == share.samples
+                )
         work.take_stock(done.reshape(5, 7))
     assert np.array_equal(done, expected.ravel()) and not work.parts
 
 
-@pytest.mark.parametrize("most, least, expected", [
-    (100, 1, WorkPart(0, 10, 3, 8)), (16, 1, WorkPart(0, 2, 3, 8)), (4, 1, WorkPart(0, 1, 3, 4)),
-    (4, 4, WorkPart(0, 4, 3, 1)), (0, 5, WorkPart(0, 5, 3, 1)), (40, 10, WorkPart(0, 10, 3, 4))])
+@pytest.mark.parametrize(
+    "most, least, expected",
+    [
+        (100, 1, WorkPart(0, 10, 3, 8)),
+        (16, 1, WorkPart(0, 2, 3, 8)),
+        (4, 1, WorkPart(0, 1, 3, 4)),
+        (4, 4, WorkPart(0, 4, 3, 1)),
+        (0, 5, WorkPart(0, 5, 3, 1)),
+        (40, 10, WorkPart(0, 10, 3, 4)),
+    ],
+)
 def test_a_share_is_no_larger_than_asked(most: int, least: int, expected: WorkPart) -> None:
     """In tiles times samples, down to one sample of the fewest tiles; the remainder is queued after the other tiles."""
     work = WorkQueue(np.full((2, 5), 3))
@@ -78,7 +92,7 @@ def test_every_stretch_is_spread(count: int) -> None:
     assert np.all(np.diff(runs, axis=1) == 1)
     for k in (k for k in (2, 5, 13, 40) if k < count):
         for first in range(0, count - k, max(1, count // 7)):
-            places = np.sort(runs[first:first + k, 0]) // RUN
+            places = np.sort(runs[first : first + k, 0]) // RUN
             gaps = np.diff([*places, places[0] + count])
             assert gaps.max() <= 2.7 * count / k + 3
 

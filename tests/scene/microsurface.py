@@ -33,7 +33,7 @@ def reflected_part(alpha: float, eta: float, cosine: float, count: int, rng: np.
 
 def _lambda(w: Doubles, alpha: float) -> Doubles:
     """Return Smith's Lambda of directions (n, 3), including downward ones."""
-    root = np.sqrt(1 + alpha**2 * (w[:, 0]**2 + w[:, 1]**2) / np.maximum(w[:, 2]**2, 1e-30))
+    root = np.sqrt(1 + alpha**2 * (w[:, 0] ** 2 + w[:, 1] ** 2) / np.maximum(w[:, 2] ** 2, 1e-30))
     return np.asarray(np.where(w[:, 2] > 0, root - 1, -root - 1) / 2)
 
 
@@ -41,10 +41,10 @@ def _next_height(w: Doubles, height: Doubles, alpha: float, rng: np.random.Gener
     """Return the next height at which rays hit the surface, infinite if they leave (algorithm 1)."""
     u, shadow = rng.random(len(w)), _lambda(w, alpha)
     up = w[:, 2] > 0
-    leaves = up & (u > 1 - np.maximum(height, 1e-300)**np.where(up, shadow, 1))
+    leaves = up & (u > 1 - np.maximum(height, 1e-300) ** np.where(up, shadow, 1))
     exponent = 1 / np.where(np.abs(shadow) < 1e-12, 1e-12, shadow)
     with np.errstate(over="ignore"):
-        return np.where(leaves, np.inf, np.clip(height * (1 - u)**-exponent, 0, 1))
+        return np.where(leaves, np.inf, np.clip(height * (1 - u) ** -exponent, 0, 1))
 
 
 def _scattered(wo: Doubles, alpha: float, eta: Doubles, rng: np.random.Generator) -> tuple[Doubles, Masks]:

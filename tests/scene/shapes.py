@@ -12,14 +12,19 @@ Faces = NDArray[np.int32]
 
 
 def icosphere(subdivisions: int) -> tuple[Vertices, Faces]:
-    """Return the unit icosphere: an icosahedron subdivided `subdivisions` times, counter-clockwise seen from outside.
-    """
+    """Return the unit icosphere: an icosahedron subdivided `subdivisions` times, counter-clockwise seen from
+    outside."""
     golden = (1 + 5**0.5) / 2
-    points = [np.array(p, float) for a, b in itertools.product((-1, 1), (-golden, golden))
-              for p in ((0, a, b), (a, b, 0), (b, 0, a))]
-    faces = [corners for corners in itertools.combinations(range(12), 3)
-             if all(np.isclose(np.linalg.norm(points[i] - points[j]), 2)
-                    for i, j in itertools.combinations(corners, 2))]
+    points = [
+        np.array(p, float)
+        for a, b in itertools.product((-1, 1), (-golden, golden))
+        for p in ((0, a, b), (a, b, 0), (b, 0, a))
+    ]
+    faces = [
+        corners
+        for corners in itertools.combinations(range(12), 3)
+        if all(np.isclose(np.linalg.norm(points[i] - points[j]), 2) for i, j in itertools.combinations(corners, 2))
+    ]
     points = [p / np.linalg.norm(p) for p in points]
     triangles = [[points[i] for i in corners] for corners in faces]
     for _ in range(subdivisions):
@@ -31,8 +36,9 @@ def icosphere(subdivisions: int) -> tuple[Vertices, Faces]:
     return vertices.astype(np.float32), indices.reshape(-1, 3).astype(np.int32)
 
 
-def _quarters(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
-              ) -> list[list[NDArray[np.float64]]]:
+def _quarters(
+    a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]
+) -> list[list[NDArray[np.float64]]]:
     ab, bc, ca = ((p + q) / np.linalg.norm(p + q) for p, q in ((a, b), (b, c), (c, a)))
     return [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
 

@@ -99,8 +99,8 @@ def test_keyframes_move_what_they_name(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seconds", [2.0, -2.0])
 def test_a_turntable_goes_once_around(seconds: float) -> None:
-    """It rotates about the axis through the target: a quarter turn in a quarter of the frames, counter-clockwise above.
-    """
+    """It rotates about the axis through the target: a quarter turn in a quarter of the frames, counter-clockwise
+    above."""
     camera = Camera(position=(3, 2, 4), look_at=(1, 1, 1), up=(0, 5, 0), fov_degrees=20)
     scene = Scene(camera=camera, animation=Animation(fps=8, turntable_seconds=seconds))
     cameras = [still.camera for _, still in frames(scene)]
@@ -117,19 +117,26 @@ def test_a_turntable_goes_once_around(seconds: float) -> None:
 KEY = Keyframe(time=0, position=(0, 0, 5))
 
 
-@pytest.mark.parametrize(("animation", "words"), [
-    (Animation(), "has no keyframes and no turntable_seconds"), (Animation(keyframes=(KEY,)), "has 1 keyframe and"),
-    (Animation(turntable_seconds=0), "turntable_seconds: is 0; write"),
-    (Animation(turntable_seconds=1, keyframes=(KEY, KEY)), "keep one"),
-    (Animation(keyframes=(KEY, KEY)), "keyframe[1].time: 0 is not after the previous one, 0"),
-    (Animation(keyframes=(KEY, Keyframe(time=1e9))), "more than 1000000"),
-    (Animation(fps=4, keyframes=(KEY, Keyframe(time=2, position=(0, 0, -5)))), "in frame 4, 1 s after the first"),
-    (Animation(keyframes=(KEY, Keyframe(time=2, position=(0, 5, 0)))), "frame 48, 2 s after the first, the camera has "
-     "no orientation: it looks along its up"),
-    (Animation(fps=1e30, turntable_seconds=1e30), "would have 1e+60 frames, more than 1000000"),
-    (Animation(fps=0), "animation.fps: 0 is not above 0"),
-    (Animation(keyframes=(KEY, Keyframe(time=1, fov_degrees=200))), "animation.keyframes[1].fov_degrees: 200"),
-    (Animation(keyframes=(KEY, 3)), "animation.keyframes[1]: 3 is not of type Keyframe")])  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("animation", "words"),
+    [
+        (Animation(), "has no keyframes and no turntable_seconds"),
+        (Animation(keyframes=(KEY,)), "has 1 keyframe and"),
+        (Animation(turntable_seconds=0), "turntable_seconds: is 0; write"),
+        (Animation(turntable_seconds=1, keyframes=(KEY, KEY)), "keep one"),
+        (Animation(keyframes=(KEY, KEY)), "keyframe[1].time: 0 is not after the previous one, 0"),
+        (Animation(keyframes=(KEY, Keyframe(time=1e9))), "more than 1000000"),
+        (Animation(fps=4, keyframes=(KEY, Keyframe(time=2, position=(0, 0, -5)))), "in frame 4, 1 s after the first"),
+        (
+            Animation(keyframes=(KEY, Keyframe(time=2, position=(0, 5, 0)))),
+            "frame 48, 2 s after the first, the camera has no orientation: it looks along its up",
+        ),
+        (Animation(fps=1e30, turntable_seconds=1e30), "would have 1e+60 frames, more than 1000000"),
+        (Animation(fps=0), "animation.fps: 0 is not above 0"),
+        (Animation(keyframes=(KEY, Keyframe(time=1, fov_degrees=200))), "animation.keyframes[1].fov_degrees: 200"),
+        (Animation(keyframes=(KEY, 3)), "animation.keyframes[1]: 3 is not of type Keyframe"),  # type: ignore[arg-type]
+    ],
+)
 def test_what_cannot_be_shown_is_refused(animation: Animation, words: str) -> None:
     problems = scene_problems(Scene(animation=animation))
     assert len(problems) == 1 and words in problems[0]
@@ -138,15 +145,19 @@ def test_what_cannot_be_shown_is_refused(animation: Animation, words: str) -> No
 
 
 def test_mistakes_in_the_file_are_told_together(tmp_path: Path) -> None:
-    (tmp_path / "a.toml").write_text("keyframe = [3, { tim = 1 }, { time = 2, look_at = [0, 1] }]\n"
-                                     "animation = { fsp = 3, keyframes = [] }\n")
+    (tmp_path / "a.toml").write_text(
+        "keyframe = [3, { tim = 1 }, { time = 2, look_at = [0, 1] }]\nanimation = { fsp = 3, keyframes = [] }\n"
+    )
     with pytest.raises(SceneError) as refused:
         load(tmp_path / "a.toml")
     assert [problem.partition(": ")[2] for problem in refused.value.problems] == [
         "animation.keyframes: keyframes are tables of their own; write [[keyframe]]",
         'animation: key "fsp" is unknown; did you mean "fps"?',
-        "keyframe[0]: 3 is not a table; write [[keyframe]]", "keyframe[1]: time is missing; add it",
-        'keyframe[1]: key "tim" is unknown; did you mean "time"?', "keyframe[2].look_at: [0, 1] has 2 entries; write 3"]
+        "keyframe[0]: 3 is not a table; write [[keyframe]]",
+        "keyframe[1]: time is missing; add it",
+        'keyframe[1]: key "tim" is unknown; did you mean "time"?',
+        "keyframe[2].look_at: [0, 1] has 2 entries; write 3",
+    ]
 
 
 @pytest.mark.parametrize("count", [0, -24])
@@ -155,9 +166,13 @@ def test_a_turntable_without_frames(count: int) -> None:
         turntable(Scene(), count)
 
 
-@pytest.mark.parametrize(("scene", "chosen", "kind", "words"), [
-    (Scene(name="still"), None, SceneError, "still: has no animation"),
-    (turntable(Scene(), 8), [3, 8], UsageError, "scene has no frame 8; its frames are 0 to 7")])
+@pytest.mark.parametrize(
+    ("scene", "chosen", "kind", "words"),
+    [
+        (Scene(name="still"), None, SceneError, "still: has no animation"),
+        (turntable(Scene(), 8), [3, 8], UsageError, "scene has no frame 8; its frames are 0 to 7"),
+    ],
+)
 def test_frames_that_are_not_there(scene: Scene, chosen: Any, kind: type[ClrtError], words: str) -> None:
     with pytest.raises(kind, match=words):
         frames(scene, chosen)

@@ -53,8 +53,10 @@ def test_points_of_many_triangles_take_no_time_of_their_square() -> None:
 
 
 def test_scene_files_say_creases(tmp_path: Path) -> None:
-    text = ('[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]\nfaces = [[0, 1, 2], [0, 2, 3]]\n'
-            'crease_degrees = 30\n')
+    text = (
+        "[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]\nfaces = [[0, 1, 2], [0, 2, 3]]\n"
+        "crease_degrees = 30\n"
+    )
     scene = tmp_path / "a.toml"
     scene.write_text(text + 'normals = "smooth"')
     normals = load(scene).meshes[0].normals

@@ -21,12 +21,12 @@ def single_bounce(alpha: float, eta: float, cosine: float, steps: int = 1500) ->
     """Return the albedo of Walter's formula (2007, eq. 20 and 21), reflected and transmitted, integrated over normals
     by slope: the midpoint rule in the azimuth and in x, tan² θ = alpha²·(1 − r)/r with r = (1 − x)³."""
     x, phi = (np.arange(steps) + 0.5)[:, None] / steps, np.pi * (np.arange(steps) + 0.5) / steps
-    rest = (1 - x)**3
+    rest = (1 - x) ** 3
     tangent = alpha * np.sqrt((1 - rest) / rest)
     up = 1 / np.sqrt(1 + tangent**2)
     cos_o = np.maximum(cosine * up + np.sqrt(1 - cosine**2) * tangent * up * np.cos(phi), 1e-12)
-    weight = 3 * (1 - x)**2 * cos_o / (cosine * up)    # D·(wo·h)/cos wo dωh
-    cos2_t = 1 - (1 - np.minimum(cos_o, 1)**2) / eta**2
+    weight = 3 * (1 - x) ** 2 * cos_o / (cosine * up)  # D·(wo·h)/cos wo dωh
+    cos2_t = 1 - (1 - np.minimum(cos_o, 1) ** 2) / eta**2
     cos_t = np.sqrt(np.maximum(cos2_t, 0))
     parallel = (eta * cos_o - cos_t) / (eta * cos_o + cos_t)
     perpendicular = (cos_o - eta * cos_t) / (cos_o + eta * cos_t)
@@ -40,8 +40,7 @@ def single_bounce(alpha: float, eta: float, cosine: float, steps: int = 1500) ->
     return float(np.sum(weight * (fresnel * seen(back) + (1 - fresnel) * seen(on))) / steps**2)
 
 
-@pytest.mark.parametrize(("ior", "roughness"), [
-    (1.5, 0.6), (2.4, 0.3), *others((1.5, 1.0), (1.02, 0.8), (0.5, 0.5))])
+@pytest.mark.parametrize(("ior", "roughness"), [(1.5, 0.6), (2.4, 0.3), *others((1.5, 1.0), (1.02, 0.8), (0.5, 0.5))])
 def test_losses_of_a_single_bounce(ior: float, roughness: float) -> None:
     alpha = roughness**2
     cosines = energy.angles(energy.grazing(ior, alpha))
@@ -73,7 +72,7 @@ def test_the_rest_balances() -> None:
         (m, part), (m_inside, part_inside) = row[:, -1]
         assert part + part_inside == pytest.approx(1)
         assert m_inside * ior**2 == pytest.approx(m, rel=1e-5)
-        squares, rest = energy.angles(near)**2, row[:, :-1, 1]
+        squares, rest = energy.angles(near) ** 2, row[:, :-1, 1]
         integrals = np.sum((rest[:, 1:] + rest[:, :-1]) / 2 * np.diff(squares), axis=1) * [1, ior**2]
         mean = m * near**2 * np.log1p(near**-2)
         assert [part * mean, part_inside * mean] == pytest.approx(list(integrals), rel=0.01, abs=1e-6)
@@ -83,12 +82,14 @@ def test_rows_are_the_tables_of_their_roughness() -> None:
     shape = -1, 2, energy.STEPS + 2, 2
     rows = np.reshape(energy.tables(1.5, None, False), shape)
     for row in (0, 7, 24):
-        one = np.reshape(energy.tables(1.5, (row / (energy.ROWS - 1))**2, False), shape)
+        one = np.reshape(energy.tables(1.5, (row / (energy.ROWS - 1)) ** 2, False), shape)
         np.testing.assert_allclose(rows[row, :, :-1], one[0, :, :-1], atol=2e-3)
 
 
-@pytest.mark.parametrize(("ior", "roughness", "most"), [
-    (1.5, 0.6, 0.03), (2.4, 0.6, 0.03), (1.5, 0.3, 0.02), (2.4, 1.0, 0.06), (1.5, 1.0, 0.18)])
+@pytest.mark.parametrize(
+    ("ior", "roughness", "most"),
+    [(1.5, 0.6, 0.03), (2.4, 0.6, 0.03), (1.5, 0.3, 0.02), (2.4, 1.0, 0.06), (1.5, 1.0, 0.18)],
+)
 def test_sides_share_light_as_in_a_random_walk(ior: float, roughness: float, most: float) -> None:
     """The reflected share of all light agrees, from angles on both sides."""
     rng, alpha = np.random.default_rng(1), roughness**2

@@ -14,7 +14,7 @@ from ..rendering.layers import Left, taken_from_gloss, under_coat, under_fibres
 
 Doubles = NDArray[np.float64]
 PICKED = [12, 24, 48, 72, 96]
-COSINES = (np.array(PICKED) / STEPS)**2
+COSINES = (np.array(PICKED) / STEPS) ** 2
 
 
 def entries(base: float, film: float, fibres: float) -> Doubles:
@@ -27,7 +27,7 @@ def entries(base: float, film: float, fibres: float) -> Doubles:
 def test_what_layers_take_from_gloss(base: float, film: float, fibres: float) -> None:
     """∫ gloss·(T(wo) − min(T(wo), T(wi))) dwi of coat, sheen, and both, for f0 and f90."""
     coat, threads = under_coat(1, film), under_fibres(1, fibres)
-    layers: list[Left] = [coat, threads, lambda c: coat(c) + threads(c) - coat(c) * threads(c)]    # 1 − E·E of both
+    layers: list[Left] = [coat, threads, lambda c: coat(c) + threads(c) - coat(c) * threads(c)]  # 1 − E·E of both
     found = entries(base, film, fibres)[3:][PICKED]
     for layer, left in enumerate(layers):
         whole, by_f90 = (np.array([taken_from_gloss(left, c, base**2, f0) for c in COSINES]) for f0 in (1.0, 0.0))

@@ -18,22 +18,28 @@ from .shapes import icosphere
 
 def good_scene() -> Scene:
     vertices, faces = icosphere(1)
-    return Scene(meshes=[Mesh(vertices, faces, MetallicRoughness(preset="gold"), vertices.copy(), "ball")],
-                 spheres=[Sphere(material=Diffuse(color=(0.0, 0.5, 1.0), emission=(10.0, 0.0, 0.0)))],
-                 lights=[PointLight(position=(0.0, 1.0, 2.0), intensity=(1.0, 1.0, 1.0)),
-                         DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0))],
-                 environment=Environment(image=np.ones((2, 4, 3), np.float32)))
+    return Scene(
+        meshes=[Mesh(vertices, faces, MetallicRoughness(preset="gold"), vertices.copy(), "ball")],
+        spheres=[Sphere(material=Diffuse(color=(0.0, 0.5, 1.0), emission=(10.0, 0.0, 0.0)))],
+        lights=[
+            PointLight(position=(0.0, 1.0, 2.0), intensity=(1.0, 1.0, 1.0)),
+            DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0)),
+        ],
+        environment=Environment(image=np.ones((2, 4, 3), np.float32)),
+    )
 
 
 def set_array(name: str, index: Any, value: float) -> Callable[[Scene], None]:
     def change(scene: Scene) -> None:
         getattr(scene.meshes[0], name)[index] = value
+
     return change
 
 
 def set_mesh(**values: Any) -> Callable[[Scene], None]:
     def change(scene: Scene) -> None:
         scene.meshes[0] = replace(scene.meshes[0], **values)
+
     return change
 
 
@@ -41,6 +47,7 @@ def set_scene(**values: Any) -> Callable[[Scene], None]:
     def change(scene: Scene) -> None:
         for name, value in values.items():
             setattr(scene, name, value)
+
     return change
 
 
@@ -50,6 +57,7 @@ TRIANGLE = Mesh(np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0]], np.float32), np.arra
 def place(*matrices: Any, **values: Any) -> Callable[[Scene], None]:
     def change(scene: Scene) -> None:
         scene.instances += [Instance(**{"mesh": scene.meshes[0], "to_world": matrix, **values}) for matrix in matrices]
+
     return change
 
 
@@ -94,8 +102,10 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "instance affine": (place(np.ones((4, 4))), "to_world has shape (4, 4); write a numpy array of shape (3, 4), or"),
     "instance text": (place("up"), "to_world has shape (); write a numpy array"),
     "instance huge": (place(1e38 * np.eye(3, 4), mesh=TRIANGLE), "moves the mesh outside the range of float32"),
-    "instance mesh": (place(np.eye(3, 4), mesh=Mesh(TRIANGLE.vertices, TRIANGLE.faces + 1)),
-                      'instance[0].mesh "mesh": faces[0] uses vertex 3'),
+    "instance mesh": (
+        place(np.eye(3, 4), mesh=Mesh(TRIANGLE.vertices, TRIANGLE.faces + 1)),
+        'instance[0].mesh "mesh": faces[0] uses vertex 3',
+    ),
     "instance no mesh": (place(np.eye(3, 4), mesh="ball"), 'instance[0].mesh: "ball" is not a Mesh'),
     "instance material": (place(np.eye(3, 4), material="gold"), 'instance[0].material: "gold" is not of type Material'),
     "no instance": (set_scene(instances=["ball"]), 'instance[0]: "ball" is not of type Instance; write a clrt'),

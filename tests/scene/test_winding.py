@@ -36,9 +36,11 @@ def cube(half: float, center: tuple[float, float, float], material: Diffuse) -> 
 
 def room(*meshes: Mesh) -> Scene:
     """Return a room 3 high with inward faces, a sphere and a camera."""
-    return Scene(meshes=[turned(cube(1.5, (0, 1.5, 0), Diffuse())), *meshes],
-                 spheres=[Sphere(center=(0, 0.5, 0), radius=0.5)],
-                 camera=Camera(position=(0, 1.5, 1.4), look_at=(0, 1, 0)))
+    return Scene(
+        meshes=[turned(cube(1.5, (0, 1.5, 0), Diffuse())), *meshes],
+        spheres=[Sphere(center=(0, 0.5, 0), radius=0.5)],
+        camera=Camera(position=(0, 1.5, 1.4), look_at=(0, 1, 0)),
+    )
 
 
 def test_the_cube_is_wound_outwards() -> None:
@@ -95,15 +97,17 @@ def test_bulbs_anywhere_among_things_are_found_by_their_winding(seed: int) -> No
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    bulb = Mesh((CUBE @ turn.T * rng.uniform(0.01, 0.3) + rng.uniform(-1, 1, 3)).astype(np.float32), OUTWARD, LAMP,
-                name="bulb")
+    bulb = Mesh(
+        (CUBE @ turn.T * rng.uniform(0.01, 0.3) + rng.uniform(-1, 1, 3)).astype(np.float32), OUTWARD, LAMP, name="bulb"
+    )
     spheres = [Sphere(center=tuple(5 + rng.uniform(0, 5, 3)), radius=float(rng.uniform(0.1, 2))) for _ in range(4)]
     scene = Scene(meshes=[bulb], spheres=spheres, camera=Camera(position=(-5, 0, 0)))
     assert backward_emitters(scene) == []
     assert backward_emitters(replace(scene, meshes=[turned(bulb)])) == ["bulb"]
 
 
-@pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "scenes").glob("*.toml")),
-                         ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted((Path(__file__).parents[2] / "scenes").glob("*.toml")), ids=lambda path: path.stem
+)
 def test_no_scene_that_ships_is_warned_of(path: Path) -> None:
     assert backward_emitters(load(path)) == []

@@ -6,8 +6,21 @@ import sys
 import time
 from importlib import import_module
 
-NAMES = ("launches", "interrupts", "kills", "damage", "errors", "calibration",
-         "scaling", "drivers", "caches", "large_models", "horizon", "rough_glass", "agreement")
+NAMES = (
+    "launches",
+    "interrupts",
+    "kills",
+    "damage",
+    "errors",
+    "calibration",
+    "scaling",
+    "drivers",
+    "caches",
+    "large_models",
+    "horizon",
+    "rough_glass",
+    "agreement",
+)
 
 for name in sys.argv[1:] or NAMES:
     if name not in NAMES:

@@ -43,12 +43,28 @@ def trial() -> Iterator[str]:
 
 def pictures(folder: Path, cache: str | None, count: int) -> set[str]:
     """Return the digests of the images of `count` processes that start together."""
-    named = {} if cache is None else {"HOME": str(folder), "CLRT_CACHE_DIR": str(folder / cache),
-                                      "POCL_CACHE_DIR": str(folder / cache / "pocl")}
+    named = (
+        {}
+        if cache is None
+        else {
+            "HOME": str(folder),
+            "CLRT_CACHE_DIR": str(folder / cache),
+            "POCL_CACHE_DIR": str(folder / cache / "pocl"),
+        }
+    )
     command = (sys.executable, "-P", "-m", "clrt", "render", str(CORNELL), "--size", "64x64", "--spp", "4", "-q", "-o")
-    started = [subprocess.Popen([*command, f"{number}.exr"], cwd=folder, stderr=subprocess.PIPE, text=True,
-                                env=surroundings(TMPDIR=str(folder), **named), stdout=subprocess.DEVNULL,
-                                preexec_fn=no_rights) for number in range(count)]
+    started = [
+        subprocess.Popen(
+            [*command, f"{number}.exr"],
+            cwd=folder,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=surroundings(TMPDIR=str(folder), **named),
+            stdout=subprocess.DEVNULL,
+            preexec_fn=no_rights,
+        )
+        for number in range(count)
+    ]
     for process in started:
         _, messages = process.communicate(timeout=600)
         assert process.returncode == 0, messages

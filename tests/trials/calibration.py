@@ -36,5 +36,7 @@ def trial() -> Iterator[str]:
     for fewest in FEWEST:
         ratios = [ratio for spp in LEVELS if spp >= fewest for ratio in every[spp]]
         told, low = calibration(ratios), sum(ratio * RIGHT < 1 for ratio in ratios)
-        yield (f"of {told['pictures']} pictures of {fewest} samples or more {told['within']:.1%} are right to {RIGHT}, "
-               f"{low / len(ratios):.1%} are told too low; median {told['median']:.2f}, worst {told['worst']:.2f}")
+        yield (
+            f"of {told['pictures']} pictures of {fewest} samples or more {told['within']:.1%} are right to {RIGHT}, "
+            f"{low / len(ratios):.1%} are told too low; median {told['median']:.2f}, worst {told['worst']:.2f}"
+        )

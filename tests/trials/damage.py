@@ -26,17 +26,18 @@ SIZE, SPP = (48, 48), 8
 Damage = Callable[[bytes, random.Random], bytes]
 #: Damage applied to the newer of two generations, or to both.
 DAMAGES: dict[str, Damage] = {
-    "cut": lambda content, rng: content[:rng.randrange(len(content))],
+    "cut": lambda content, rng: content[: rng.randrange(len(content))],
     "a bit flipped": lambda content, rng: _flipped(content, rng.randrange(len(content)), 1 << rng.randrange(8)),
-    "old version": lambda content, rng: content.replace(MAGIC, MAGIC.replace(b"3", b"1"), 1)}
+    "old version": lambda content, rng: content.replace(MAGIC, MAGIC.replace(b"3", b"1"), 1),
+}
 
 
 def _flipped(content: bytes, place: int, bit: int) -> bytes:
-    return content[:place] + bytes([content[place] ^ bit]) + content[place + 1:]
+    return content[:place] + bytes([content[place] ^ bit]) + content[place + 1 :]
 
 
 def trial() -> Iterator[str]:
-    logging.disable(logging.WARNING)    # one per damage
+    logging.disable(logging.WARNING)  # one per damage
     rng = random.Random(3)
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "a.ck"

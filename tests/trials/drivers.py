@@ -42,5 +42,6 @@ def answered(folder: Path, what: str) -> str:
     rows = listed(folder)
     seconds = time.perf_counter() - start
     usable = [row["name"] for row in rows if row["usable"]]
-    return (f"{what}: {len(rows)} rows, {len(usable)} usable, {seconds:.1f} s"
-            + ("" if seconds <= LIMIT else f", MORE THAN {LIMIT} s"))
+    return f"{what}: {len(rows)} rows, {len(usable)} usable, {seconds:.1f} s" + (
+        "" if seconds <= LIMIT else f", MORE THAN {LIMIT} s"
+    )

@@ -20,14 +20,30 @@ from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene
 
 WHITE = (1.0, 1.0, 1.0)
 MATERIALS: dict[str, Material] = {
-    "diffuse": Diffuse(color=WHITE), "mirror": Mirror(color=WHITE),
+    "diffuse": Diffuse(color=WHITE),
+    "mirror": Mirror(color=WHITE),
     "metal .1": MetallicRoughness(color=WHITE, metallic=1.0, roughness=0.1, multiple_scattering=True),
     "metal .5": MetallicRoughness(color=WHITE, metallic=1.0, roughness=0.5, multiple_scattering=True),
-    "plastic .3": MetallicRoughness(color=WHITE, roughness=0.3)}
+    "plastic .3": MetallicRoughness(color=WHITE, roughness=0.3),
+}
 SETTINGS = RenderSettings(size=(160, 160), spp=64, max_depth=64)
 #: Radius and height along a vase with a flared rim.
-PROFILE = ((0.0, -1.0), (0.45, -1.0), (0.75, -0.7), (0.85, -0.3), (0.7, 0.2), (0.4, 0.6), (0.3, 0.8), (0.38, 0.95),
-           (0.55, 1.05), (0.6, 1.1), (0.55, 1.12), (0.45, 1.05), (0.3, 0.9), (0.22, 0.75))
+PROFILE = (
+    (0.0, -1.0),
+    (0.45, -1.0),
+    (0.75, -0.7),
+    (0.85, -0.3),
+    (0.7, 0.2),
+    (0.4, 0.6),
+    (0.3, 0.8),
+    (0.38, 0.95),
+    (0.55, 1.05),
+    (0.6, 1.1),
+    (0.55, 1.12),
+    (0.45, 1.05),
+    (0.3, 0.9),
+    (0.22, 0.75),
+)
 
 
 def sphere() -> Mesh:
@@ -67,17 +83,22 @@ def dome() -> Mesh:
     return Mesh(square, np.array([[0, 1, 2], [0, 2, 3]], np.int32), bumps, uv=uv)
 
 
-SHAPES = {"sphere of 80 triangles": (sphere(), Camera(position=(0, 0, 5), fov_degrees=30)),
-          "vase": (vase(), Camera(position=(0, 1.5, 5), fov_degrees=30)),
-          "dome in a normal map": (dome(), Camera(position=(0, -2.2, 2.2), up=(0, 0, 1), fov_degrees=42))}
+SHAPES = {
+    "sphere of 80 triangles": (sphere(), Camera(position=(0, 0, 5), fov_degrees=30)),
+    "vase": (vase(), Camera(position=(0, 1.5, 5), fov_degrees=30)),
+    "dome in a normal map": (dome(), Camera(position=(0, -2.2, 2.2), up=(0, 0, 1), fov_degrees=42)),
+}
 
 
 def covered(mesh: Mesh, camera: Camera, material: Material) -> Doubles:
     """Return the radiance of the pixels that the mesh covers."""
+
     def pixels(of: Material) -> Doubles:
-        scene = Scene(meshes=[replace(mesh, material=of)], camera=camera, environment=Environment(color=WHITE),
-                      render=SETTINGS)
+        scene = Scene(
+            meshes=[replace(mesh, material=of)], camera=camera, environment=Environment(color=WHITE), render=SETTINGS
+        )
         return clrt.render(scene).pixels[..., 0].astype(np.float64)
+
     return np.asarray(pixels(material)[pixels(Diffuse(color=(0.0, 0.0, 0.0))) == 0])
 
 

@@ -25,8 +25,10 @@ def trial() -> Iterator[str]:
     for size in SIZES:
         rows = [interrupted(size, moments.uniform(0, 2.5)) for _ in range(TIMES)]
         for what, seconds in zip(("written", "ended"), zip(*rows)):
-            yield (f"{size[0]}x{size[1]} {what} after {median(seconds):.2f} s (median), {max(seconds):.2f} s at most; "
-                   f"all {TIMES} pictures and checkpoints valid")
+            yield (
+                f"{size[0]}x{size[1]} {what} after {median(seconds):.2f} s (median), {max(seconds):.2f} s at most; "
+                f"all {TIMES} pictures and checkpoints valid"
+            )
 
 
 def interrupted(size: tuple[int, int], moment: float) -> tuple[float, float]:
@@ -34,8 +36,20 @@ def interrupted(size: tuple[int, int], moment: float) -> tuple[float, float]:
     width, height = size
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        process = start(folder, CORNELL, "--size", f"{width}x{height}", "--time", 600, "--checkpoint", "a.ck", "-o",
-                        "a.png", "--progress", "json")
+        process = start(
+            folder,
+            CORNELL,
+            "--size",
+            f"{width}x{height}",
+            "--time",
+            600,
+            "--checkpoint",
+            "a.ck",
+            "-o",
+            "a.png",
+            "--progress",
+            "json",
+        )
         await_rendering(process)
         time.sleep(moment)
         begin, clock = time.time(), time.perf_counter()

@@ -38,12 +38,28 @@ def trial() -> Iterator[str]:
             finish(render(folder, mode))
             met["equal"] += arrays(folder / "a.ck") == expected
     yield f"{met['equal']} of {KILLS} equal; when killed: " + ", ".join(
-        f"{count} {what}" for what, count in met.items() if what != "equal")
+        f"{count} {what}" for what, count in met.items() if what != "equal"
+    )
 
 
 def render(folder: Path, mode: str) -> subprocess.Popen[str]:
-    return start(folder, CORNELL, "--size", "64x64", "--checkpoint", "a.ck", "--resume", "--checkpoint-every", 0, "-o",
-                 "a.exr", "--progress", "json", *MODES[mode], program=ALL_THE_TIME)
+    return start(
+        folder,
+        CORNELL,
+        "--size",
+        "64x64",
+        "--checkpoint",
+        "a.ck",
+        "--resume",
+        "--checkpoint-every",
+        0,
+        "-o",
+        "a.exr",
+        "--progress",
+        "json",
+        *MODES[mode],
+        program=ALL_THE_TIME,
+    )
 
 
 def left_alone(mode: str) -> tuple[dict[str, bytes], float]:

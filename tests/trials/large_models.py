@@ -31,8 +31,9 @@ def trial() -> Iterator[str]:
         caches = os.environ | dict.fromkeys(CACHES, folder)
         for programs in ("compiled", "kept"):
             done = subprocess.run([sys.executable, "-m", __name__, model], env=caches, check=True, capture_output=True)
-            yield f"{programs:10}" + "".join(f"{seconds:9.2f} s{peak / 1e6:6.0f} MB"
-                                             for seconds, peak in json.loads(done.stdout))
+            yield f"{programs:10}" + "".join(
+                f"{seconds:9.2f} s{peak / 1e6:6.0f} MB" for seconds, peak in json.loads(done.stdout)
+            )
 
 
 def write_ply(file: Path, triangles: int) -> None:
@@ -40,9 +41,15 @@ def write_ply(file: Path, triangles: int) -> None:
     vertices, corners = resized(*bumpy_ball(), triangles)
     faces = np.zeros(len(corners), [("count", "u1"), ("corners", "<i4", 3)])
     faces["count"], faces["corners"] = 3, corners
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}",
-              *(f"property float {axis}" for axis in "xyz"), f"element face {len(faces)}",
-              "property list uchar int vertex_indices", "end_header\n"]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(vertices)}",
+        *(f"property float {axis}" for axis in "xyz"),
+        f"element face {len(faces)}",
+        "property list uchar int vertex_indices",
+        "end_header\n",
+    ]
     file.write_bytes("\n".join(header).encode() + vertices.astype("<f4").tobytes() + faces.tobytes())
 
 

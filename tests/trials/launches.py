@@ -31,15 +31,18 @@ def trial() -> Iterator[str]:
         if not device["usable"] or device["type"] not in ("cpu", "gpu") or "Oclgrind" in device["platform"]:
             continue
         for scene in GALLERY:
-            done = subprocess.run([sys.executable, "-m", __name__, str(scene), device["id"]], capture_output=True,
-                                  text=True)
+            done = subprocess.run(
+                [sys.executable, "-m", __name__, str(scene), device["id"]], capture_output=True, text=True
+            )
             if done.returncode:
                 yield f"{device['platform'][:25]:26}{scene.stem:18} {done.stderr.strip().splitlines()[-1]}"
                 continue
             row = json.loads(done.stdout)
             longest = max(longest, row["longest"], row["other"])
-            yield (f"{device['platform'][:25]:26}{scene.stem:18}{row['launches']:9}{row['median']:9.3f}"
-                   f"{row['longest']:9.3f}  {row['other']:.3f} {row['name']}")
+            yield (
+                f"{device['platform'][:25]:26}{scene.stem:18}{row['launches']:9}{row['median']:9.3f}"
+                f"{row['longest']:9.3f}  {row['other']:.3f} {row['name']}"
+            )
     yield f"longest of all {longest:.3f} s, to be at most {LIMIT} s on CPUs"
 
 
@@ -66,8 +69,13 @@ def measured(scene: str, device: str) -> dict[str, Any]:
     took = [(name, run_seconds(event)) for name, event in launched]
     mine = sorted(seconds for name, seconds in took if name in INTEGRATORS)
     other = max(((seconds, name) for name, seconds in took if name not in INTEGRATORS), default=(0.0, ""))
-    return {"launches": len(mine), "median": mine[len(mine) // 2], "other": other[0], "name": other[1],
-            "longest": max(mine[-1], report["kernel"]["longest_launch_seconds"])}
+    return {
+        "launches": len(mine),
+        "median": mine[len(mine) // 2],
+        "other": other[0],
+        "name": other[1],
+        "longest": max(mine[-1], report["kernel"]["longest_launch_seconds"]),
+    }
 
 
 if __name__ == "__main__":

@@ -11,16 +11,26 @@ SCENES = Path(__file__).parents[2] / "scenes"
 GALLERY = sorted(SCENES.glob("*.toml"))
 CORNELL = SCENES / "cornell.toml"
 #: A device may write checkpoints all the time, so that a signal often comes while one is written.
-ALL_THE_TIME = ("-c", "import clrt.rendering.checkpoint.checkpoints as checkpoint; checkpoint.COST = 0; "
-                      "from clrt.cli import main; main()")
+ALL_THE_TIME = (
+    "-c",
+    "import clrt.rendering.checkpoint.checkpoints as checkpoint; checkpoint.COST = 0; "
+    "from clrt.cli import main; main()",
+)
 CLRT = ("-P", "-m", "clrt")
 
 
-def start(folder: Path, *options: object, program: tuple[str, ...] = CLRT,
-          environment: Mapping[str, str] | None = None) -> subprocess.Popen[str]:
+def start(
+    folder: Path, *options: object, program: tuple[str, ...] = CLRT, environment: Mapping[str, str] | None = None
+) -> subprocess.Popen[str]:
     """Start `clrt render` with these options in the folder."""
-    return subprocess.Popen([sys.executable, *program, "render", *map(str, options)], cwd=folder, text=True,
-                            stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment)
+    return subprocess.Popen(
+        [sys.executable, *program, "render", *map(str, options)],
+        cwd=folder,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=environment,
+    )
 
 
 def finish(process: subprocess.Popen[str], code: int = 0) -> str:

@@ -31,9 +31,9 @@ def radiance() -> Doubles:
     back, entering = np.zeros((STEPS, STEPS)), np.zeros((STEPS, STEPS))
     leaving, reflected = np.zeros(STEPS), np.zeros(STEPS)
     for row in range(STEPS):
-        (inside, cosines), (out, _) = scattered(1 / IOR, ROUGHNESS**2, ROOTS[row:row + 1])
+        (inside, cosines), (out, _) = scattered(1 / IOR, ROUGHNESS**2, ROOTS[row : row + 1])
         back[row], leaving[row] = _onto_roots(inside, cosines), out.sum()
-        (off, _), (into, cosines) = scattered(IOR, ROUGHNESS**2, ROOTS[row:row + 1])
+        (off, _), (into, cosines) = scattered(IOR, ROUGHNESS**2, ROOTS[row : row + 1])
         entering[row], reflected[row] = _onto_roots(into, cosines), off.sum()
     return np.asarray(reflected + entering @ np.linalg.solve(np.eye(STEPS) - back, leaving))
 
@@ -43,15 +43,16 @@ def _onto_roots(weights: Doubles, cosines: Doubles) -> Doubles:
     place = np.clip(np.sqrt(np.maximum(cosines, 0)) * STEPS - 0.5, 0, STEPS - 1 - 1e-9).ravel()
     low = place.astype(int)
     share = place - low
-    return np.asarray(np.bincount(low, weights.ravel() * (1 - share), STEPS)
-                      + np.bincount(low + 1, weights.ravel() * share, STEPS))
+    return np.asarray(
+        np.bincount(low, weights.ravel() * (1 - share), STEPS) + np.bincount(low + 1, weights.ravel() * share, STEPS)
+    )
 
 
 def expected_image() -> Doubles:
     """Return the pixels (WIDTH, WIDTH), each a mean over FINER² points."""
     across = ((np.arange(WIDTH * FINER) + 0.5) / (WIDTH * FINER) * 2 - 1) * np.tan(np.radians(FOV_DEGREES) / 2)
     away2 = np.add.outer(across**2, across**2)
-    nearest2 = DISTANCE**2 * away2 / (1 + away2) / RADIUS**2      # squared, of the ray to the center, in radii
+    nearest2 = DISTANCE**2 * away2 / (1 + away2) / RADIUS**2  # squared, of the ray to the center, in radii
     cosine = np.sqrt(np.maximum(1 - nearest2, 0))
     fine = np.where(nearest2 < 1, np.interp(np.sqrt(cosine), ROOTS, radiance()), 1)
     return np.asarray(fine.reshape(WIDTH, FINER, WIDTH, FINER).mean((1, 3)))
@@ -59,9 +60,12 @@ def expected_image() -> Doubles:
 
 def trial() -> Iterator[str]:
     glass = Dielectric(ior=IOR, roughness=ROUGHNESS, multiple_scattering=False)
-    scene = Scene(spheres=[Sphere(radius=RADIUS, material=glass)], environment=Environment(color=(1.0, 1.0, 1.0)),
-                  camera=Camera(position=(0, 0, DISTANCE), look_at=(0, 0, 0), fov_degrees=FOV_DEGREES),
-                  render=RenderSettings(size=(WIDTH, WIDTH), max_depth=64))
+    scene = Scene(
+        spheres=[Sphere(radius=RADIUS, material=glass)],
+        environment=Environment(color=(1.0, 1.0, 1.0)),
+        camera=Camera(position=(0, 0, DISTANCE), look_at=(0, 0, 0), fov_degrees=FOV_DEGREES),
+        render=RenderSettings(size=(WIDTH, WIDTH), max_depth=64),
+    )
     expected = expected_image()
     blocks = block_means(np.repeat(expected[..., None], 3, axis=2), BLOCK)[..., 0]
     lit = blocks < 0.9999
@@ -71,5 +75,7 @@ def trial() -> Iterator[str]:
         means = found.whole[:, 0]
         errors = found.blocks[:, lit, 0].std(0, ddof=1) / SEEDS**0.5
         z = (found.blocks[:, lit, 0].mean(0) - blocks[lit]) / errors
-        yield (f"{name:26} {means.mean():.6f} ± {means.std(ddof=1) / SEEDS**0.5:.6f}; z of {z.size} blocks: "
-               f"root mean square {np.sqrt(np.mean(z**2)):.2f}")
+        yield (
+            f"{name:26} {means.mean():.6f} ± {means.std(ddof=1) / SEEDS**0.5:.6f}; z of {z.size} blocks: "
+            f"root mean square {np.sqrt(np.mean(z**2)):.2f}"
+        )

@@ -34,8 +34,7 @@ def trial() -> Iterator[str]:
     if len(found) < 2:
         yield "there is one PoCL: OCL_ICD_VENDORS names a folder without the system's, or none is installed"
         return
-    RENDERS.update(one=("--device", found[0]["id"]),
-                   two=("--device", found[0]["id"], "--device", found[1]["id"]))
+    RENDERS.update(one=("--device", found[0]["id"]), two=("--device", found[0]["id"], "--device", found[1]["id"]))
     os.environ["POCL_MAX_PTHREAD_COUNT"] = "1"
     yield f"{'scene':12}{'one':>9}{'two':>9}  times as fast"
     for scene in SCENES:
@@ -44,8 +43,22 @@ def trial() -> Iterator[str]:
             folder = Path(name)
             for _ in range(TURNS):
                 for kind, devices in RENDERS.items():
-                    finish(start(folder, scene, "--size", "512x384", "--spp", 64, "-q", "-o", f"{kind}.exr",
-                                 "--report", f"{kind}.json", *devices))
+                    finish(
+                        start(
+                            folder,
+                            scene,
+                            "--size",
+                            "512x384",
+                            "--spp",
+                            64,
+                            "-q",
+                            "-o",
+                            f"{kind}.exr",
+                            "--report",
+                            f"{kind}.json",
+                            *devices,
+                        )
+                    )
                     seconds[kind].append(json.loads((folder / f"{kind}.json").read_text())["seconds"])
             pictures = [read_image(folder / f"{kind}.exr").tobytes() for kind in RENDERS]
         one, two = (median(seconds[kind]) for kind in RENDERS)

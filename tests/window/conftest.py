@@ -17,8 +17,11 @@ collect_ignore_glob = [] if which("Xvfb") else ["test_[!d]*.py"]
 def display() -> Iterator[str]:
     """Start a display and yield its name."""
     read, write = os.pipe()
-    server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24", "-nolisten", "tcp"],
-                              pass_fds=[write], stderr=subprocess.DEVNULL)
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24", "-nolisten", "tcp"],
+        pass_fds=[write],
+        stderr=subprocess.DEVNULL,
+    )
     os.close(write)
     with open(read) as number:
         yield f":{number.readline().strip()}"

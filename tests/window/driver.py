@@ -77,7 +77,7 @@ class Driver:
     def picture(self) -> Levels:
         """Return the part of the screenshot that shows the image."""
         (x, y), (width, height) = self.app.viewport.corner, self.app.viewport.size
-        return self.window()[y:y + height, x:x + width]
+        return self.window()[y : y + height, x : x + width]
 
 
 def changed(before: Levels, after: Levels) -> NDArray[np.bool_]:

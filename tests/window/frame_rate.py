@@ -1,6 +1,6 @@
 """Measures how smoothly the camera moves through a scene. On an idle machine with a display (or Xvfb's):
 
-    python -c "from tests.window.frame_rate import main; main('scenes/spheres.toml')"
+python -c "from tests.window.frame_rate import main; main('scenes/spheres.toml')"
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def main(scene: str, seconds: float = 10.0, frame_rate: float = 20.0) -> dict[st
     def test(window: Driver) -> None:
         window.rest()
         window.panel("Picture")
-        window.context.yield_(30)   # let the window come to rest, too
+        window.context.yield_(30)  # let the window come to rest, too
         figures.update(_walk(window, seconds))
 
     content = load(Path(scene))
@@ -63,6 +63,10 @@ def _walk(window: Driver, seconds: float) -> dict[str, Any]:
         window.context.key_up(key)
     took = time.perf_counter() - start
     sizes = np.median([snapshot.pixels.shape[1::-1] for snapshot in seen.values()], axis=0)
-    return {"latency_ms": round(float(np.median(latencies)), 1), "worst_latency_ms": round(max(latencies), 1),
-            "pictures_per_second": round(len(seen) / took, 1), "frames_per_second": round(frames / took, 1),
-            "median_size": sizes.tolist()}
+    return {
+        "latency_ms": round(float(np.median(latencies)), 1),
+        "worst_latency_ms": round(max(latencies), 1),
+        "pictures_per_second": round(len(seen) / took, 1),
+        "frames_per_second": round(frames / took, 1),
+        "median_size": sizes.tolist(),
+    }

@@ -50,8 +50,11 @@ def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         assert not (tmp_path / "locked.png").stat().st_size
 
     drive(two_balls(integrator="path"), test, tmp_path)
-    done = subprocess.run([sys.executable, "-m", "clrt", "render", "saved.toml", "--spp", "12", "-o", "again.exr"],
-                          capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "clrt", "render", "saved.toml", "--spp", "12", "-o", "again.exr"],
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     assert read_image(tmp_path / "saved.exr").tobytes() == read_image(tmp_path / "again.exr").tobytes()
     scene = load(tmp_path / "saved.toml")

@@ -38,7 +38,7 @@ def test_a_material_gets_a_preset(tmp_path: Path) -> None:
         mirror = window.picture()
         left, right = halves(changed(copper, mirror))
         assert left == 0 and 0.1 < right < 0.3
-        sky = 0.8 * np.array([[SKY]], np.float32)   # both types have a color, which is kept
+        sky = 0.8 * np.array([[SKY]], np.float32)  # both types have a color, which is kept
         assert at(mirror, 116, 36) == pytest.approx(to_display(sky)[0, 0].tolist(), abs=1), "its top reflects the sky"
         assert window.live.scene.materials["gold"] is window.live.scene.spheres[1].material
 
@@ -47,6 +47,7 @@ def test_a_material_gets_a_preset(tmp_path: Path) -> None:
 
 def test_every_parameter_can_be_edited(tmp_path: Path) -> None:
     """The panel has a widget named after each field of each material type."""
+
     def test(window: Driver) -> None:
         window.rest()
         window.panel("Materials")
@@ -66,6 +67,7 @@ def test_every_parameter_can_be_edited(tmp_path: Path) -> None:
 
 def test_what_need_not_be_given(tmp_path: Path) -> None:
     """Values that belong together are set and removed together, starting from the preset; textures have own fields."""
+
     def test(window: Driver) -> None:
         def gold() -> Any:
             return window.live.scene.materials["gold"]

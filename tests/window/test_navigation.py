@@ -21,8 +21,10 @@ def close(camera: Camera, other: Camera) -> None:
 
 def test_walks_are_along_the_axes() -> None:
     ahead = np.subtract(CAMERA.look_at, CAMERA.position)
-    close(walked(CAMERA, 0, 0, 0.5 * distance(CAMERA)),
-          Camera(position=(2, 1.25, 2), look_at=tuple(np.add(CAMERA.look_at, ahead / 2).tolist())))
+    close(
+        walked(CAMERA, 0, 0, 0.5 * distance(CAMERA)),
+        Camera(position=(2, 1.25, 2), look_at=tuple(np.add(CAMERA.look_at, ahead / 2).tolist())),
+    )
     right = np.subtract(walked(CAMERA, 2, 0, 0).position, CAMERA.position)
     assert np.linalg.norm(right) == pytest.approx(2) and abs(right @ ahead) < 1e-9 and abs(right @ CAMERA.up) < 1e-9
     assert np.cross(ahead, CAMERA.up) @ right > 0

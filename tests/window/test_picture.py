@@ -16,6 +16,7 @@ from .scenes import two_balls
 
 def test_it_shows_what_is_rendered(tmp_path: Path) -> None:
     """The center of each pixel has its own color, other places one between its neighbors'."""
+
     def test(window: Driver) -> None:
         levels = to_display(window.rest().pixels).astype(np.int16)
         picture = window.picture()

@@ -57,6 +57,11 @@ def test_integrators_are_switched(tmp_path: Path) -> None:
 
 def test_devices_are_switched(tmp_path: Path) -> None:
     program = f"import sys; sys.path.append('.'); from tests.window.two_devices import main; main({str(tmp_path)!r})"
-    done = subprocess.run([sys.executable, "-P", "-c", program], cwd=Path(__file__).parents[2], capture_output=True,
-                          text=True, env=os.environ | {"POCL_DEVICES": "pthread basic"})
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"POCL_DEVICES": "pthread basic"},
+    )
     assert done.returncode == 0, done.stdout + done.stderr

@@ -1,6 +1,6 @@
 """Window test of changing the device, run in a process in which PoCL has two devices.
 
-    POCL_DEVICES="pthread basic" python -c "from tests.window.two_devices import main; main('folder')"
+POCL_DEVICES="pthread basic" python -c "from tests.window.two_devices import main; main('folder')"
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from .scenes import two_balls
 
 def main(folder: str) -> None:
     """Run the test; raises AssertionError if it fails."""
+
     def test(window: Driver) -> None:
         first = window.rest()
         before, devices = window.picture(), [info for info in window.app.editor.devices if info.type == "cpu"]

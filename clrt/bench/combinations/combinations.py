@@ -116,8 +116,10 @@ def _compared(device: Device, sides: Sequence[Side], spp: int, seeds: Sequence[i
     """Compare the first side with the one that differs most from it."""
     (first, dropped), *others = (_means(device, side, spp, seeds) for side in sides)
     sample = brightest(sides[0].scenes[0]) / (spp * len(seeds))
-    found = [_difference(side.name, first, other, dropped + more, UNSEEN * sample if side.files else 0.0)
-             for side, (other, more) in zip(sides[1:], others)]
+    found = [
+        _difference(side.name, first, other, dropped + more, UNSEEN * sample if side.files else 0.0)
+        for side, (other, more) in zip(sides[1:], others)
+    ]
     least = min(found, key=lambda each: each.p)
     return least._replace(p=corrected(least.p, len(found)))
 
@@ -139,8 +141,14 @@ def _difference(name: str, first: Doubles, other: Doubles, dropped: int, unseen:
     least = [corrected(float(family.min()), len(family)) for family in (p[:-3], p[-3:])]
     at = int(p[:-3].argmin()) if least[0] < least[1] else len(p) - 3 + int(p[-3:].argmin())
     whole, noise = (each[-3:].mean() / max(level[-3:].mean(), 1e-300) for each in (mean, error))
-    return _Comparison(name, corrected(min(least), 2), float(mean[at] / max(level[at], 1e-300)),
-                       float((2 + whole) / (2 - whole)) if whole < 2 else float("inf"), float(noise), dropped)
+    return _Comparison(
+        name,
+        corrected(min(least), 2),
+        float(mean[at] / max(level[at], 1e-300)),
+        float((2 + whole) / (2 - whole)) if whole < 2 else float("inf"),
+        float(noise),
+        dropped,
+    )
 
 
 def _means(device: Device, side: Side, spp: int, seeds: Sequence[int]) -> tuple[Doubles, int]:

@@ -54,8 +54,11 @@ def strategies(scene: Scene, draws: Draws) -> list[Side]:
 
     Each leaves to the other what it cannot sample: delta lights, specular directions, environments below their mean.
     """
-    return [Side("both", [scene]), Side("BSDF sampling", [scene], {"MIS_WEIGHTS": ["bench/bsdf_sampling.cl"]}),
-            Side("light sampling", [scene], {"MIS_WEIGHTS": ["bench/light_sampling.cl"]})]
+    return [
+        Side("both", [scene]),
+        Side("BSDF sampling", [scene], {"MIS_WEIGHTS": ["bench/bsdf_sampling.cl"]}),
+        Side("light sampling", [scene], {"MIS_WEIGHTS": ["bench/light_sampling.cl"]}),
+    ]
 
 
 def choice(scene: Scene, draws: Draws) -> list[Side]:
@@ -72,8 +75,10 @@ def integrators(scene: Scene, draws: Draws) -> list[Side]:
     plain = with_materials(replace(scene, environment=Environment()), _without_local_form)
     plain = replace(plain, render=replace(scene.render, max_depth=2))
     pinhole = scene.camera.projection == "perspective" and not scene.camera.aperture_radius
-    return [Side(name, [replace(plain, render=replace(plain.render, integrator=name))])
-            for name in ("path", "direct", "local", *(("raster",) if pinhole else ()))]
+    return [
+        Side(name, [replace(plain, render=replace(plain.render, integrator=name))])
+        for name in ("path", "direct", "local", *(("raster",) if pinhole else ()))
+    ]
 
 
 def brightness(scene: Scene, draws: Draws) -> list[Side]:
@@ -92,9 +97,12 @@ def partition(scene: Scene, draws: Draws) -> list[Side]:
     """Meshes may be split in two or replaced by instances, and instances by meshes."""
     halves = [half for mesh in scene.meshes for half in _halves(mesh)]
     placed = [_as_instance(mesh, draws) for mesh in scene.meshes]
-    return [Side("as it is", [scene]), Side("cut in two", [replace(scene, meshes=halves)]),
-            Side("all instances", [replace(scene, meshes=[], instances=placed + scene.instances)]),
-            Side("all meshes", [replace(scene, meshes=scene.meshes + list(map(baked, scene.instances)), instances=[])])]
+    return [
+        Side("as it is", [scene]),
+        Side("cut in two", [replace(scene, meshes=halves)]),
+        Side("all instances", [replace(scene, meshes=[], instances=placed + scene.instances)]),
+        Side("all meshes", [replace(scene, meshes=scene.meshes + list(map(baked, scene.instances)), instances=[])]),
+    ]
 
 
 def bystanders(scene: Scene, draws: Draws) -> list[Side]:
@@ -104,14 +112,18 @@ def bystanders(scene: Scene, draws: Draws) -> list[Side]:
     """
     own = [type(each) for each in _materials(scene)]
     kinds: list[type[Material]] = [draws.one_of(MATERIALS), draws.one_of(own)]
-    small = [Sphere(center=(x, -8.0, 0.0), radius=1e-3, material=draws.material(kind, emission=BLACK))
-             for x, kind in enumerate(kinds)]
+    small = [
+        Sphere(center=(x, -8.0, 0.0), radius=1e-3, material=draws.material(kind, emission=BLACK))
+        for x, kind in enumerate(kinds)
+    ]
     return [Side("as it is", [scene]), Side("with others far below", [replace(scene, spheres=scene.spheres + small)])]
 
 
 #: Properties by name.
-PROPERTIES: dict[str, Property] = {each.__name__: each for each in (
-    additivity, strategies, choice, integrators, brightness, similarity, partition, bystanders)}
+PROPERTIES: dict[str, Property] = {
+    each.__name__: each
+    for each in (additivity, strategies, choice, integrators, brightness, similarity, partition, bystanders)
+}
 #: Properties with moderate scenes (see Draws), because one side does without a sampling strategy.
 MODERATE = {"strategies", "choice", "integrators"}
 
@@ -132,8 +144,9 @@ def brighter(scene: Scene, factor: float) -> Scene:
     """Return the scene with all light multiplied by a factor; without lights if that is 0."""
     sky, lights = scene.environment, list[Light]()
     for light in scene.lights if factor else ():
-        scaled: dict[str, Any] = {name: _scaled(value, factor) for name, value in vars(light).items()
-                                  if name in STRENGTHS}
+        scaled: dict[str, Any] = {
+            name: _scaled(value, factor) for name, value in vars(light).items() if name in STRENGTHS
+        }
         lights.append(replace(light, **scaled))
     environment = replace(sky, strength=sky.strength * factor) if factor else Environment()
     return with_materials(replace(scene, lights=lights, environment=environment), lambda each: _times(each, factor))
@@ -155,8 +168,12 @@ def with_materials(scene: Scene, change: Callable[[Material], Material]) -> Scen
         return user if user.material is None else replace(user, material=made[id(user.material)])
 
     meshes = {id(mesh): changed(mesh) for mesh in (*scene.meshes, *(each.mesh for each in scene.instances))}
-    return replace(scene, meshes=[meshes[id(mesh)] for mesh in scene.meshes], spheres=list(map(changed, scene.spheres)),
-                   instances=[replace(changed(each), mesh=meshes[id(each.mesh)]) for each in scene.instances])
+    return replace(
+        scene,
+        meshes=[meshes[id(mesh)] for mesh in scene.meshes],
+        spheres=list(map(changed, scene.spheres)),
+        instances=[replace(changed(each), mesh=meshes[id(each.mesh)]) for each in scene.instances],
+    )
 
 
 def _users(scene: Scene) -> dict[str, Any]:
@@ -198,8 +215,10 @@ def _halves(mesh: Mesh) -> list[Mesh]:
     """
     if len(mesh.faces) < 2 or mesh.material.bent_by is not None:
         return [mesh]
-    return [replace(mesh, faces=np.ascontiguousarray(mesh.faces[start::2]), name=f"{mesh.name}, {start}")
-            for start in (0, 1)]
+    return [
+        replace(mesh, faces=np.ascontiguousarray(mesh.faces[start::2]), name=f"{mesh.name}, {start}")
+        for start in (0, 1)
+    ]
 
 
 def _as_instance(mesh: Mesh, draws: Draws) -> Instance:

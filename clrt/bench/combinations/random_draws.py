@@ -74,8 +74,11 @@ class Draws:
         """Return a dataclass with random fields, except those given."""
         hints = get_type_hints(kind, include_extras=True)
         specular = issubclass(kind, Material) and kind().is_specular
-        drawn = {field.name: self._field(hints[field.name], field, specular)
-                 for field in fields(kind) if field.name not in given}  # type: ignore[arg-type]
+        drawn = {
+            field.name: self._field(hints[field.name], field, specular)
+            for field in fields(kind)  # type: ignore[arg-type]
+            if field.name not in given
+        }
         return kind(**given, **drawn)
 
     def material(self, kind: type[Material], **given: Any) -> Material:

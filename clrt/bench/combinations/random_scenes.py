@@ -60,7 +60,7 @@ class _Stage:
         kinds: list[type[Material]] = [draws.one_of(MATERIALS), draws.one_of(MATERIALS)]
         maybe_diffuse: list[type[Material]] = [Diffuse, *kinds]
         self._floor(draws.material(draws.one_of(maybe_diffuse), emission=BLACK))
-        for place in PLACES[:draws.one_of((2, 3, 4))]:
+        for place in PLACES[: draws.one_of((2, 3, 4))]:
             self._stand(draws.one_of(SHAPES), place, draws.material(draws.one_of(kinds), emission=BLACK))
         for number in range(draws.one_of((2, 3))):
             kind: Any = draws.one_of([*LIGHTS, *LAMPS])
@@ -71,10 +71,27 @@ class _Stage:
                 self.lights.append(self._light(kind))
         environment = self._environment(draws.one_of(SKIES))
         clamps = {each.name: each.default for each in fields(RenderSettings) if each.name.startswith("clamp_")}
-        settings = draws.record(RenderSettings, size=SIZE, spp=16, max_depth=draws.one_of(DEPTHS), seed=0,
-                                integrator="path", shadows=True, adaptive=False, **clamps)
-        return Scene(meshes=self.meshes, instances=self.instances, spheres=self.spheres, lights=self.lights,
-                     environment=environment, camera=self._camera(), render=settings, name=name)
+        settings = draws.record(
+            RenderSettings,
+            size=SIZE,
+            spp=16,
+            max_depth=draws.one_of(DEPTHS),
+            seed=0,
+            integrator="path",
+            shadows=True,
+            adaptive=False,
+            **clamps,
+        )
+        return Scene(
+            meshes=self.meshes,
+            instances=self.instances,
+            spheres=self.spheres,
+            lights=self.lights,
+            environment=environment,
+            camera=self._camera(),
+            render=settings,
+            name=name,
+        )
 
     def _emission(self) -> Any:
         draws = self.draws
@@ -89,10 +106,20 @@ class _Stage:
         height, strength = draws.between(3.4 if draws.moderate else 2.0, 4.4), draws.decades(-0.5, 1.0)
         red, green, blue = (strength * part for part in draws.vector(0.2, 1.0))
         towards = draws.between(-0.8, 0.8) - x, -height, draws.between(-0.8, 0.8) - z
-        light = draws.record(kind, **fields_of(kind, {
-            "position": (x, height, z), "direction": towards, "irradiance": (red, green, blue),
-            "intensity": (9 * red, 9 * green, 9 * blue), "radius": 0.1 * height,
-            "radiance": (30 * red, 30 * green, 30 * blue)}))
+        light = draws.record(
+            kind,
+            **fields_of(
+                kind,
+                {
+                    "position": (x, height, z),
+                    "direction": towards,
+                    "irradiance": (red, green, blue),
+                    "intensity": (9 * red, 9 * green, 9 * blue),
+                    "radius": 0.1 * height,
+                    "radiance": (30 * red, 30 * green, 30 * blue),
+                },
+            ),
+        )
         if isinstance(light, SpotLight) and light.inner_degrees >= light.outer_degrees:
             return replace(light, inner_degrees=0.9 * light.outer_degrees)
         return light
@@ -142,8 +169,10 @@ class _Stage:
         stretch = scaling((size, 0.6 * size, -0.5 * size))
         beside = translation((middle[0], middle[1] + 0.4, middle[2]))
         flat = scaling((size, size, 0.5 * size))
-        self.instances += [Instance(own, _product(flat, *turns, translation(middle)), name="one"),
-                           Instance(own, _product(stretch, *turns, beside), name="other")]
+        self.instances += [
+            Instance(own, _product(flat, *turns, translation(middle)), name="one"),
+            Instance(own, _product(stretch, *turns, beside), name="other"),
+        ]
 
     def _sheet(self, material: Material, name: str, *placed: Any) -> Mesh:
         """Return a square with its front up, two units wide, after these transforms."""
@@ -187,10 +216,16 @@ class _Stage:
         x, y, z = far * sin(turn) * cos(elevation), far * sin(elevation), far * cos(turn) * cos(elevation)
         lens = projection == "perspective" and draws.chance(0.25)
         radius, focus = draws.between(0.02, 0.15), draws.between(3.0, 6.0)
-        given = dict(projection=projection, position=(x, y, z),
-                     look_at=(draws.between(-0.4, 0.4), 0.5, draws.between(-0.4, 0.4)), up=(0.1, 1.0, 0.0),
-                     fov_degrees=draws.between(30, 55), aperture_radius=radius if lens else 0.0,
-                     focus_distance=focus if lens else None, view_height=None)
+        given = dict(
+            projection=projection,
+            position=(x, y, z),
+            look_at=(draws.between(-0.4, 0.4), 0.5, draws.between(-0.4, 0.4)),
+            up=(0.1, 1.0, 0.0),
+            fov_degrees=draws.between(30, 55),
+            aperture_radius=radius if lens else 0.0,
+            focus_distance=focus if lens else None,
+            view_height=None,
+        )
         return draws.record(Camera, **Camera(projection=projection).unread_fields() | given)
 
 

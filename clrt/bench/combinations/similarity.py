@@ -32,11 +32,14 @@ class Similarity:
         """Return the transformed scene; its image is mirrored if `mirrored`."""
         linear = self.linear
         turned = replace(
-            scene, meshes=[transform_mesh(mesh, linear) for mesh in scene.meshes],
+            scene,
+            meshes=[transform_mesh(mesh, linear) for mesh in scene.meshes],
             instances=[replace(each, to_world=linear[:3, :3] @ each.to_world) for each in scene.instances],
             spheres=[_turned(sphere, linear) for sphere in scene.spheres],
             lights=[transform_light(light, linear) for light in scene.lights],
-            environment=self._environment(scene.environment), camera=transform_camera(scene.camera, linear))
+            environment=self._environment(scene.environment),
+            camera=transform_camera(scene.camera, linear),
+        )
         return in_frame(turned, self.frame)
 
     def _environment(self, environment: Environment) -> Environment:

@@ -31,5 +31,9 @@ def calibrations(scenes: Iterable[Mapping[str, Any]]) -> dict[str, dict[str, Any
 
 def calibration(ratios: Sequence[float]) -> dict[str, Any]:
     """Summarize ratios. pictures: their number; within: fraction within RIGHT; median; worst: farthest from 1."""
-    return {"pictures": len(ratios), "within": fmean(1 / RIGHT <= ratio <= RIGHT for ratio in ratios),
-            "median": median(ratios), "worst": max(ratios, key=lambda ratio: abs(log(ratio)) if ratio > 0 else inf)}
+    return {
+        "pictures": len(ratios),
+        "within": fmean(1 / RIGHT <= ratio <= RIGHT for ratio in ratios),
+        "median": median(ratios),
+        "worst": max(ratios, key=lambda ratio: abs(log(ratio)) if ratio > 0 else inf),
+    }

@@ -17,12 +17,20 @@ from ...scene.model import Scene
 
 #: Configurations by name, as keywords of Renderer; the first is the baseline of the others.
 CHOICES: dict[str, dict[str, Any]] = {
-    "clrt": {}, "clrt, stratified": {"sampler": "stratified"}, "clrt, independent": {"sampler": "independent"},
-    "clrt, lanes 1": {"lanes": 1}, "clrt, bvh2": {"layout": "bvh2"}}
+    "clrt": {},
+    "clrt, stratified": {"sampler": "stratified"},
+    "clrt, independent": {"sampler": "independent"},
+    "clrt, lanes 1": {"lanes": 1},
+    "clrt, bvh2": {"layout": "bvh2"},
+}
 #: Configurations compared only on request. unplanned: without known `spp`, as with --time or --error.
 MORE_CHOICES: dict[str, dict[str, Any]] = {
-    "clrt, adaptive": {"adaptive": True}, "clrt, lanes 8": {"lanes": 8}, "clrt, lanes 16": {"lanes": 16},
-    "clrt, paths in lanes": {"paths": "lanes"}, "clrt, unplanned": {"spp": None}}
+    "clrt, adaptive": {"adaptive": True},
+    "clrt, lanes 8": {"lanes": 8},
+    "clrt, lanes 16": {"lanes": 16},
+    "clrt, paths in lanes": {"paths": "lanes"},
+    "clrt, unplanned": {"spp": None},
+}
 #: Other renderers: pip package, and the module of this package with their `contestants(scene)`.
 PEERS = {"mitsuba": "mitsuba_renderer", "bpy": "cycles_renderer"}
 
@@ -42,11 +50,15 @@ class Picture(NamedTuple):
 Contestant = Callable[[int, int], Picture]
 
 
-def choices_on(scene: Scene, devices: Sequence[int],
-               choices: Mapping[str, Mapping[str, Any]] = CHOICES) -> dict[str, Contestant]:
+def choices_on(
+    scene: Scene, devices: Sequence[int], choices: Mapping[str, Mapping[str, Any]] = CHOICES
+) -> dict[str, Contestant]:
     """Return the renderer with each of `choices` on each device, whose index is in the names if there are several."""
-    return {f"{name} (device {index})" if len(devices) > 1 else name: partial(_render, scene, index, options)
-            for index in devices for name, options in choices.items()}
+    return {
+        f"{name} (device {index})" if len(devices) > 1 else name: partial(_render, scene, index, options)
+        for index in devices
+        for name, options in choices.items()
+    }
 
 
 def peers_of(scene: Scene) -> tuple[dict[str, Contestant], dict[str, str]]:
@@ -70,8 +82,11 @@ def _render(scene: Scene, device: int, options: Mapping[str, Any], spp: int, see
     """
     renderer = Renderer(scene, device=device, **{"spp": spp, "seed": seed, **options})
     seconds, cpu_seconds = 0.0, 0.0
-    for work in [partial(_passes, renderer, spp)] if renderer.settings.adaptive else [
-            partial(_even_samples, renderer, end) for end in [*(1 << k for k in range((spp - 1).bit_length())), spp]]:
+    for work in (
+        [partial(_passes, renderer, spp)]
+        if renderer.settings.adaptive
+        else [partial(_even_samples, renderer, end) for end in [*(1 << k for k in range((spp - 1).bit_length())), spp]]
+    ):
         start, cpu = time.perf_counter(), time.process_time()
         work()
         renderer.session.wait()

@@ -55,9 +55,16 @@ class Point(NamedTuple):
 Points = dict[str, dict[int, list[Point]]]
 
 
-def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort: Effort, *, peers: bool = False,
-                        choices: Mapping[str, Mapping[str, Any]] = CHOICES, given: Reference | None = None,
-                        say: Callable[[str], None] = lambda message: None) -> Iterator[dict[str, Any]]:
+def measure_convergence(
+    scenes: Sequence[Scene],
+    devices: Sequence[int],
+    effort: Effort,
+    *,
+    peers: bool = False,
+    choices: Mapping[str, Mapping[str, Any]] = CHOICES,
+    given: Reference | None = None,
+    say: Callable[[str], None] = lambda message: None,
+) -> Iterator[dict[str, Any]]:
     """Yield the results of `clrt bench converge`, scene by scene.
 
     scene, size, max_depth; reference: `spp` (0: given) and its own `relmse`; missing: why a peer is not among the
@@ -70,15 +77,22 @@ def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort:
         for package, why in missing.items():
             say(f"{scene.name}: without {package}: {why}")
     for scene, (rivals, missing) in zip(scenes, others):
+
         def on_step(step: int, name: str = scene.name) -> None:
             say(f"{name}: step {step + 1} of {effort.steps} of its reference")
 
-        reference = given or render_reference(scene, effort.steps, device=devices[0], step_spp=effort.step_spp,
-                                              on_step=on_step)
+        reference = given or render_reference(
+            scene, effort.steps, device=devices[0], step_spp=effort.step_spp, on_step=on_step
+        )
         points = take_turns(choices_on(scene, devices, choices) | rivals, reference, effort)
-        yield {"scene": scene.name, "size": scene.render.size, "max_depth": scene.render.max_depth,
-               "reference": {"spp": reference.spp, "relmse": reference.relmse}, "missing": missing,
-               "contestants": figures(points, reference)}
+        yield {
+            "scene": scene.name,
+            "size": scene.render.size,
+            "max_depth": scene.render.max_depth,
+            "reference": {"spp": reference.spp, "relmse": reference.relmse},
+            "missing": missing,
+            "contestants": figures(points, reference),
+        }
 
 
 def take_turns(contestants: Mapping[str, Contestant], reference: Reference, effort: Effort) -> Points:
@@ -97,9 +111,14 @@ def take_turns(contestants: Mapping[str, Contestant], reference: Reference, effo
 def _compare(picture: Picture, reference: Reference) -> Point:
     error = relmse(picture.pixels, reference.pixels)
     ratios = mean_ratios(picture.pixels, reference.pixels)
-    return Point(picture.spp, picture.seconds, picture.cpu_seconds, nan if error is None else error,
-                 [nan if ratio is None else ratio for ratio in ratios],
-                 nan if picture.noise is None else picture.noise)
+    return Point(
+        picture.spp,
+        picture.seconds,
+        picture.cpu_seconds,
+        nan if error is None else error,
+        [nan if ratio is None else ratio for ratio in ratios],
+        nan if picture.noise is None else picture.noise,
+    )
 
 
 def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
@@ -119,31 +138,41 @@ def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
         clear = [k for k, error in enumerate(row["relmse"]) if error > reference.relmse]
         last = clear[-1] if clear else 0
         spp, seconds, cpu_seconds, error = (row[key][last] for key in ("spp", "seconds", "cpu_seconds", "relmse"))
-        row |= {"last": last, "msamples": 1e-6 * spp * pixels / seconds, "relmse_seconds": error * seconds,
-                "relmse_cpu_seconds": error * cpu_seconds,
-                "slope": _slope([row["spp"][k] for k in clear], [row["relmse"][k] for k in clear])}
+        row |= {
+            "last": last,
+            "msamples": 1e-6 * spp * pixels / seconds,
+            "relmse_seconds": error * seconds,
+            "relmse_cpu_seconds": error * cpu_seconds,
+            "slope": _slope([row["spp"][k] for k in clear], [row["relmse"][k] for k in clear]),
+        }
     first = next(iter(rows.values()))
     for row in rows.values():
-        row |= {"ratio": _over(row["relmse_seconds"], first["relmse_seconds"]),
-                "cpu_ratio": _over(row["relmse_cpu_seconds"], first["relmse_cpu_seconds"])}
-    tests = mean_tests({name: np.array([point.mean_ratio for point in levels[max(levels)]])
-                        for name, levels in points.items()}, reference.means)
+        row |= {
+            "ratio": _over(row["relmse_seconds"], first["relmse_seconds"]),
+            "cpu_ratio": _over(row["relmse_cpu_seconds"], first["relmse_cpu_seconds"]),
+        }
+    tests = mean_tests(
+        {name: np.array([point.mean_ratio for point in levels[max(levels)]]) for name, levels in points.items()},
+        reference.means,
+    )
     return {name: row | tests[name] for name, row in rows.items()}
 
 
 def _averages(levels: Mapping[int, Sequence[Point]], own: float) -> dict[str, Any]:
     """Return a contestant's results by samples. own: the reference's relMSE."""
     channels = list(zip(*(point.mean_ratio for point in levels[max(levels)])))
-    return {"spp": [level[0].spp for level in levels.values()],
-            "seconds": [median(point.seconds for point in level) for level in levels.values()],
-            "cpu_seconds": [median(point.cpu_seconds for point in level) for level in levels.values()],
-            "relmse": [fmean(point.relmse for point in level) - own for level in levels.values()],
-            "relmse_range": [[choose(point.relmse for point in level) - own for choose in (min, max)]
-                             for level in levels.values()],
-            "noise_ratio": [[noise_ratio(point.noise, point.relmse, own) for point in level]
-                            for level in levels.values()],
-            "mean_ratio": [fmean(channel) for channel in channels],
-            "agrees": not any(min(channel) > 1 + AGREES or max(channel) < 1 - AGREES for channel in channels)}
+    return {
+        "spp": [level[0].spp for level in levels.values()],
+        "seconds": [median(point.seconds for point in level) for level in levels.values()],
+        "cpu_seconds": [median(point.cpu_seconds for point in level) for level in levels.values()],
+        "relmse": [fmean(point.relmse for point in level) - own for level in levels.values()],
+        "relmse_range": [
+            [choose(point.relmse for point in level) - own for choose in (min, max)] for level in levels.values()
+        ],
+        "noise_ratio": [[noise_ratio(point.noise, point.relmse, own) for point in level] for level in levels.values()],
+        "mean_ratio": [fmean(channel) for channel in channels],
+        "agrees": not any(min(channel) > 1 + AGREES or max(channel) < 1 - AGREES for channel in channels),
+    }
 
 
 def _slope(samples: Sequence[int], errors: Sequence[float]) -> float:

@@ -69,12 +69,22 @@ class Reference:
 
     def plus(self, picture: NDArray[np.float64]) -> Reference:
         """Return the reference with one more step."""
-        return Reference(np.append(self.means, [picture.mean((0, 1))], 0), self.total + picture,
-                         self.squares + picture**2, self.step_spp)
+        return Reference(
+            np.append(self.means, [picture.mean((0, 1))], 0),
+            self.total + picture,
+            self.squares + picture**2,
+            self.step_spp,
+        )
 
 
-def render_reference(scene: Scene, steps: int, *, device: str | int | None = None, step_spp: int = STEP_SPP,
-                     on_step: Callable[[int], None] = lambda step: None) -> Reference:
+def render_reference(
+    scene: Scene,
+    steps: int,
+    *,
+    device: str | int | None = None,
+    step_spp: int = STEP_SPP,
+    on_step: Callable[[int], None] = lambda step: None,
+) -> Reference:
     """Return the reference of `scene` with at least `steps` steps (2 or more), from the cache as far as possible.
 
     step_spp: samples per pixel of a step; the larger, the faster errors fall, as samples are stratified within a step.

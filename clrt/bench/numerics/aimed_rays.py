@@ -19,10 +19,12 @@ def rays_of_kinds(vertices: Floats, faces: Faces, count: int, seed: int = 0) -> 
     rng = np.random.default_rng(seed)
     corners = vertices[faces[rng.integers(0, len(faces), count)]].astype(np.float64)
     along = rng.random((count, 1))
-    return {"random": scattered_rays(vertices, count, seed),
-            "vertices": _from_inside(rng, vertices, corners[:, 0]),
-            "edges": _from_inside(rng, vertices, along * corners[:, 0] + (1 - along) * corners[:, 1]),
-            "axes": _along_axes(rng, vertices, corners[:, 0])}
+    return {
+        "random": scattered_rays(vertices, count, seed),
+        "vertices": _from_inside(rng, vertices, corners[:, 0]),
+        "edges": _from_inside(rng, vertices, along * corners[:, 0] + (1 - along) * corners[:, 1]),
+        "axes": _along_axes(rng, vertices, corners[:, 0]),
+    }
 
 
 def inside_rays(vertices: Floats, faces: Faces, count: int, rng: np.random.Generator) -> Rays:
@@ -30,7 +32,7 @@ def inside_rays(vertices: Floats, faces: Faces, count: int, rng: np.random.Gener
     corners = vertices[faces[rng.integers(0, len(faces), count)]].astype(np.float64)
     weights = rng.dirichlet([1, 1, 1], count)
     weights[: count // 3] = [1, 0, 0]
-    edges = weights[count // 3: 2 * (count // 3)]
+    edges = weights[count // 3 : 2 * (count // 3)]
     edges[:, 2] = 0
     edges /= edges.sum(axis=1, keepdims=True)
     return _from_inside(rng, vertices, np.einsum("ni,nij->nj", weights, corners))

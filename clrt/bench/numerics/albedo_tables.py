@@ -40,23 +40,24 @@ class Table(NamedTuple):
 
 def fit_table(smith: Smith) -> Table:
     """Fit one form of masking–shadowing over all roughnesses and angles."""
-    alpha, root_y = ROUGHNESSES[:, None]**2, 2 * np.sqrt(ROUGHNESSES) - 1
+    alpha, root_y = ROUGHNESSES[:, None] ** 2, 2 * np.sqrt(ROUGHNESSES) - 1
     exact = np.array([albedos(COSINES, a, smith) for a in alpha[:, 0]])
     loss, grazing = np.maximum(1 - exact[:, 0], 0), exact[:, 1]
     x, q = stretched(COSINES, loss_width(alpha, smith))
     target, weight = (loss / (1 - q), 1 - q)
     if is_squared(smith):
-        target, weight = np.sqrt(loss) / (1 - q), 2 * (1 - q) * np.sqrt(loss + SMALL * (1 - q)**2)
+        target, weight = np.sqrt(loss) / (1 - q), 2 * (1 - q) * np.sqrt(loss + SMALL * (1 - q) ** 2)
     loss_fit = _fit(x, 2 * ROUGHNESSES - 1, target, weight, LOSS)
     x, _ = stretched(COSINES, 2 * alpha)
-    root = np.maximum(grazing / (1 - loss), 1e-12)**0.2
+    root = np.maximum(grazing / (1 - loss), 1e-12) ** 0.2
     weight = 5 * root**4 * alpha * (1 - loss)
     fresnel_fit = _fit(x, root_y, (1 - root - COSINES) / alpha, weight, FRESNEL)
     table = Table(loss_fit, fresnel_fit, np.zeros(1), np.zeros(1))
     means = np.array([_means(table, a, smith) for a in alpha[:, 0]])
     mean_loss = means[:, 0] / mean_scale(alpha[:, 0], smith)
-    return table._replace(mean_loss=_fit_mean(root_y, mean_loss, MEAN_LOSS),
-                          mean_fresnel=_fit_mean(root_y, means[:, 1], MEAN_FRESNEL))
+    return table._replace(
+        mean_loss=_fit_mean(root_y, mean_loss, MEAN_LOSS), mean_fresnel=_fit_mean(root_y, means[:, 1], MEAN_FRESNEL)
+    )
 
 
 def is_squared(smith: Smith) -> bool:
@@ -93,7 +94,7 @@ def evaluate(table: Table, cosines: Doubles, alpha: float, smith: Smith) -> tupl
     loss = root**2 if is_squared(smith) else root
     x, _ = stretched(cosines, np.asarray(2 * alpha))
     g = cosines + alpha * polynomial.polyval(x, polynomial.polyval(2 * np.sqrt(roughness) - 1, table.fresnel.T))
-    return loss, (1 - loss) * (1 - np.clip(g, 0, 1))**5
+    return loss, (1 - loss) * (1 - np.clip(g, 0, 1)) ** 5
 
 
 def _means(table: Table, alpha: float, smith: Smith) -> tuple[float, float]:
@@ -120,8 +121,8 @@ def _fit(x: Doubles, y: Doubles, values: Doubles, weights: Doubles, terms: tuple
         stress *= error / error.max() + FLOOR
         stress /= stress.mean()
     matrix = best.reshape(terms)
-    powers = np.array([np.pad(chebyshev.cheb2poly(row), (0, terms[1]))[:terms[1]] for row in matrix])
-    return np.array([np.pad(chebyshev.cheb2poly(row), (0, terms[0]))[:terms[0]] for row in powers.T]).T
+    powers = np.array([np.pad(chebyshev.cheb2poly(row), (0, terms[1]))[: terms[1]] for row in matrix])
+    return np.array([np.pad(chebyshev.cheb2poly(row), (0, terms[0]))[: terms[0]] for row in powers.T]).T
 
 
 def _fit_mean(y: Doubles, values: Doubles, terms: int) -> Doubles:
@@ -132,10 +133,11 @@ def _fit_mean(y: Doubles, values: Doubles, terms: int) -> Doubles:
 def write_table(smith: Smith, table: Table) -> Iterator[str]:
     """Yield the lines of the table file."""
     name = smith.upper()
-    scale = {"schlick": "0.125f * square(sqrt(alpha) + 1.0f)",
-             "schlick_ibl": "0.5f * alpha"}.get(smith, "square(alpha)")
+    scale = {"schlick": "0.125f * square(sqrt(alpha) + 1.0f)", "schlick_ibl": "0.5f * alpha"}.get(
+        smith, "square(alpha)"
+    )
     width = "2.0f * alpha" if is_squared(smith) else f"{16 if smith == 'schlick' else 32}.0f * scale"
-    yield f"// Directional albedos of GGX with smith = \"{smith}\" (ggx_albedo.cl), written by"
+    yield f'// Directional albedos of GGX with smith = "{smith}" (ggx_albedo.cl), written by'
     yield f"// `python -m clrt.bench.numerics.albedo_tables {smith}`."
     for part in ("loss", "fresnel"):
         kind = part.upper()
@@ -144,8 +146,9 @@ def write_table(smith: Smith, table: Table) -> Iterator[str]:
         yield "};"
     for part in ("mean_loss", "mean_fresnel"):
         yield f"constant float {name}_{part.upper()}[{part.upper()}_Y] = {{"
-        yield from wrap(f"{', '.join(map(_literal, getattr(table, part)))}}};", 116, initial_indent=INDENT,
-                        subsequent_indent=INDENT)
+        yield from wrap(
+            f"{', '.join(map(_literal, getattr(table, part)))}}};", 116, initial_indent=INDENT, subsequent_indent=INDENT
+        )
     yield ""
     yield f"static inline GgxAlbedo {smith}_albedo(real alpha) {{"
     yield f"    real scale = {scale};"

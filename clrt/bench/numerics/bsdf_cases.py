@@ -19,18 +19,36 @@ from .kernel_probe import Doubles, Probe
 
 #: Test values of fields for which the ends and the middle of the range are not suitable.
 NUMBERS: dict[str, tuple[Any, ...]] = {
-    "roughness": (0.0, 0.05, 0.1, 0.3, 0.6, 1.0), "ior": (0.25, 1.5), "shininess": (0.0, 3.0, 30.0, 1000.0),
-    "ambient": (1.0,)}
+    "roughness": (0.0, 0.05, 0.1, 0.3, 0.6, 1.0),
+    "ior": (0.25, 1.5),
+    "shininess": (0.0, 3.0, 30.0, 1000.0),
+    "ambient": (1.0,),
+}
 COLOR = (1.0, 0.5, 0.2)
 #: Sets of fields by kernel, each tested on its own with every second number; other variants leave them at defaults.
-LAYERS: dict[str, tuple[dict[str, Any], ...]] = {"metallic_roughness": (
-    {"ior": 2.0}, {"specular": 0.0}, {"specular": 0.5, "specular_color": COLOR},
-    {"clearcoat": 1.0}, {"clearcoat": 0.5, "clearcoat_roughness": 0.6}, {"clearcoat": 1.0, "clearcoat_roughness": 1.0},
-    {"sheen_color": COLOR}, {"sheen_color": (1.0, 1.0, 1.0), "sheen_roughness": 0.5},
-    {"sheen_color": (0.2, 0.3, 0.4), "sheen_roughness": 1.0}, {"transmission": 1.0},
-    {"transmission": 0.5, "specular": 0.5, "clearcoat": 0.7, "clearcoat_roughness": 0.2, "sheen_color": (0.5, 0.5, 0.5),
-     "sheen_roughness": 0.3}),
-    "dielectric": ({"multiple_scattering": False},)}
+LAYERS: dict[str, tuple[dict[str, Any], ...]] = {
+    "metallic_roughness": (
+        {"ior": 2.0},
+        {"specular": 0.0},
+        {"specular": 0.5, "specular_color": COLOR},
+        {"clearcoat": 1.0},
+        {"clearcoat": 0.5, "clearcoat_roughness": 0.6},
+        {"clearcoat": 1.0, "clearcoat_roughness": 1.0},
+        {"sheen_color": COLOR},
+        {"sheen_color": (1.0, 1.0, 1.0), "sheen_roughness": 0.5},
+        {"sheen_color": (0.2, 0.3, 0.4), "sheen_roughness": 1.0},
+        {"transmission": 1.0},
+        {
+            "transmission": 0.5,
+            "specular": 0.5,
+            "clearcoat": 0.7,
+            "clearcoat_roughness": 0.2,
+            "sheen_color": (0.5, 0.5, 0.5),
+            "sheen_roughness": 0.3,
+        },
+    ),
+    "dielectric": ({"multiple_scattering": False},),
+}
 #: cos θ of wo, down to grazing; the sines are float32 numbers or round to 1.
 COSINES = (1.0, 0.6, 0.1, 2.0**-7, 2.0**-10, 2.0**-13)
 #: Azimuth of wo in radians for cosines above STEEP; grazing wo have azimuth 0.
@@ -55,13 +73,17 @@ def worded_variants(kind: type[Material]) -> list[Material]:
     """Return each string of each field, one at a time, with all flags, and numbers in the middle of the range."""
     numbers, flags, words = _values(kind)
     middle = {name: values[len(values) // 2] for name, values in numbers.items()}
-    return [kind(**middle, **raised, **{name: word}) for name, found in words.items() for word in found
-            for raised in _product(flags)]
+    return [
+        kind(**middle, **raised, **{name: word})
+        for name, found in words.items()
+        for word in found
+        for raised in _product(flags)
+    ]
 
 
 def views(material: Material) -> list[float]:
     """Return those COSINES from which the material's lobes are wide enough for float32."""
-    alpha = 1.0 if material.is_specular else max(getattr(material, "roughness", 1.0)**2, ALPHA_MIN)
+    alpha = 1.0 if material.is_specular else max(getattr(material, "roughness", 1.0) ** 2, ALPHA_MIN)
     return [cosine for cosine in COSINES if 2 * alpha * cosine >= NARROWEST]
 
 
@@ -87,8 +109,9 @@ class Bsdfs:
     probe: Probe
     code: NDArray[np.int32]
 
-    def sample(self, which: int, wo: Doubles, numbers: Doubles,
-               front: bool = True) -> tuple[Doubles, Doubles, Doubles, Doubles]:
+    def sample(
+        self, which: int, wo: Doubles, numbers: Doubles, front: bool = True
+    ) -> tuple[Doubles, Doubles, Doubles, Doubles]:
         """Sample wi (n, 3), weight (n, 3), pdf (n,), specular (n,).
 
         wo: (3,) or (n, 3); numbers: (n, 3) in [0, 1).
@@ -104,11 +127,13 @@ class Bsdfs:
 
     def _sample(self, which: int, wo: Doubles, numbers: Doubles, front: bool) -> Doubles:
         n = len(numbers)
-        return self.probe("bsdf_sample", 9, np.full(n, self.code[which]), np.broadcast_to(wo, (n, 3)), numbers,
-                          front=front)
+        return self.probe(
+            "bsdf_sample", 9, np.full(n, self.code[which]), np.broadcast_to(wo, (n, 3)), numbers, front=front
+        )
 
-    def value(self, which: NDArray[np.intp] | int, wo: Doubles, wi: Doubles,
-              front: bool = True) -> tuple[Doubles, Doubles]:
+    def value(
+        self, which: NDArray[np.intp] | int, wo: Doubles, wi: Doubles, front: bool = True
+    ) -> tuple[Doubles, Doubles]:
         """Evaluate f·|cos| (n, 3) and pdf (n,) for wi (n, 3); which: (n,) or one; wo: (n, 3) or (3,)."""
         codes = np.broadcast_to(self.code[which], len(wi))
         out = self.probe("bsdf_value", 4, codes, np.broadcast_to(wo, wi.shape), wi, front=front)
@@ -148,7 +173,7 @@ def _numbers(kind: type[Material], name: str) -> tuple[Any, ...]:
     hint, default = get_type_hints(kind, include_extras=True)[name], getattr(kind(), name)
     if isinstance(default, tuple):
         return (COLOR,)
-    plain = next((part for part in get_args(hint) if get_origin(part) is Annotated), hint)   # of a number or a texture
+    plain = next((part for part in get_args(hint) if get_origin(part) is Annotated), hint)  # of a number or a texture
     limits = [limit.bound for limit in get_args(plain)[1:] if isinstance(limit, Limit)]
     return (min(limits), sum(limits) / 2, max(limits)) if len(limits) == 2 else (default,)
 

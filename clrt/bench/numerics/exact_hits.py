@@ -71,10 +71,14 @@ def _prepare(corners: Doubles) -> _Triangles:
     lengths = np.linalg.norm(edges, axis=2)
     pluecker = np.concatenate([np.cross(p, edges), edges], axis=2) / lengths[..., None]
     normals = np.cross(edges[:, 0], edges[:, 1])
-    return _Triangles((pluecker[:, 0], pluecker[:, 1], pluecker[:, 2]),
-                      normals / np.linalg.norm(normals, axis=1, keepdims=True), p[:, 0],
-                      lengths.max(axis=1)**2 / (2 * areas(p)), first,
-                      float(np.linalg.norm(corners, axis=2).max(initial=0)))
+    return _Triangles(
+        (pluecker[:, 0], pluecker[:, 1], pluecker[:, 2]),
+        normals / np.linalg.norm(normals, axis=1, keepdims=True),
+        p[:, 0],
+        lengths.max(axis=1) ** 2 / (2 * areas(p)),
+        first,
+        float(np.linalg.norm(corners, axis=2).max(initial=0)),
+    )
 
 
 def areas(corners: Doubles) -> Doubles:
@@ -101,8 +105,9 @@ def _closest(triangles: _Triangles, origins: Doubles, directions: Doubles) -> Bo
     return Bounds(low, high, primitive)
 
 
-def _met(triangles: _Triangles, origins: Doubles, directions: Doubles,
-         reach: Doubles) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
+def _met(
+    triangles: _Triangles, origins: Doubles, directions: Doubles, reach: Doubles
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
     """Return rays (rows) and triangles (columns) of certain and possible hits, also at t < 0; and which are certain."""
     pluecker = np.concatenate([directions, np.cross(origins, directions)], axis=1)
     one, two, three = (pluecker @ edge.T for edge in triangles.edges)
@@ -112,8 +117,14 @@ def _met(triangles: _Triangles, origins: Doubles, directions: Doubles,
     return row, column, (least[row, column] > reach[row]) | (most[row, column] < -reach[row])
 
 
-def _distances(triangles: _Triangles, origins: Doubles, directions: Doubles, reach: Doubles, row: NDArray[np.intp],
-               column: NDArray[np.intp]) -> tuple[Doubles, Doubles]:
+def _distances(
+    triangles: _Triangles,
+    origins: Doubles,
+    directions: Doubles,
+    reach: Doubles,
+    row: NDArray[np.intp],
+    column: NDArray[np.intp],
+) -> tuple[Doubles, Doubles]:
     """Return the smallest and largest t of pairs with the plane: uncertain for grazing rays and narrow triangles."""
     normals = triangles.normals[column]
     cosine = np.einsum("ij,ij->i", normals, directions[row])

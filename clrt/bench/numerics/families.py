@@ -28,18 +28,38 @@ from .exact_hits import UNDECIDED, closest_bounds
 from .row import Row
 
 #: Tests of each family.
-FAMILIES = {"triangle": ("watertight", "moller_trumbore", "precomputed", "baldwin_weber"),
-            "box": ("robust", "plain"), "sphere": ("robust", "textbook"), "offset": ("bound", "ulp", "fixed")}
+FAMILIES = {
+    "triangle": ("watertight", "moller_trumbore", "precomputed", "baldwin_weber"),
+    "box": ("robust", "plain"),
+    "sphere": ("robust", "textbook"),
+    "offset": ("bound", "ulp", "fixed"),
+}
 #: Errors of each family: keys and descriptions; the first is the primary criterion.
 FIGURES = {
-    "triangle": {"misses": "misses/M", "misses_moved": "misses/M moved", "wrong": "wrong hits/M",
-                 "ulp_max": "t ulp max", "ulp_999": "t ulp 99.9 %", "ulp_999_grazing": "grazing 99.9 %",
-                 "bytes": "bytes/triangle"},
-    "box": {"misses": "misses/M", "misses_moved": "misses/M moved", "wrong": "wrong on axes/M",
-            "lost": "lost on plane/M"},
+    "triangle": {
+        "misses": "misses/M",
+        "misses_moved": "misses/M moved",
+        "wrong": "wrong hits/M",
+        "ulp_max": "t ulp max",
+        "ulp_999": "t ulp 99.9 %",
+        "ulp_999_grazing": "grazing 99.9 %",
+        "bytes": "bytes/triangle",
+    },
+    "box": {
+        "misses": "misses/M",
+        "misses_moved": "misses/M moved",
+        "wrong": "wrong on axes/M",
+        "lost": "lost on plane/M",
+    },
     "sphere": {"wrong": "wrong hits/M", "ulp_max": "t ulp max"},
-    "offset": {"wrong": "wrong pixels/M", "dark_near": "dark, in place", "dark_far": "dark, elsewhere",
-               "lit_near": "leaks, in place", "lit_far": "leaks, elsewhere"}}
+    "offset": {
+        "wrong": "wrong pixels/M",
+        "dark_near": "dark, in place",
+        "dark_far": "dark, elsewhere",
+        "lit_near": "leaks, in place",
+        "lit_far": "leaks, elsewhere",
+    },
+}
 LEAST_GRAZING_DEGREES = 85.0
 BALLS = 2000
 #: Rays from inside closed meshes per test.
@@ -97,7 +117,11 @@ def _race_pictures(subjects: list[Subject], quick: bool) -> Iterator[Contestant]
 
 
 RACES: dict[str, Callable[[list[Subject], bool], Iterable[Contestant]]] = {
-    "triangle": _race_rays, "box": _race_rays, "sphere": _race_balls, "offset": _race_pictures}
+    "triangle": _race_rays,
+    "box": _race_rays,
+    "sphere": _race_balls,
+    "offset": _race_pictures,
+}
 
 
 def _triangle_errors(subject: Subject, quick: bool) -> dict[str, Any]:
@@ -109,9 +133,14 @@ def _triangle_errors(subject: Subject, quick: bool) -> dict[str, Any]:
     wrong, count = _wrong_hits(subject, quick)
     steep, grazing = _distance_errors(subject, quick)
     mesh = bumpy_ball(4)
-    return {"bytes": subject.query(mesh).tree.bytes / len(mesh[1]), **_parts(rows),
-            "wrong": 1e6 * wrong / count, "ulp_max": float(steep.max()),
-            "ulp_999": float(np.quantile(steep, 0.999)), "ulp_999_grazing": float(np.quantile(grazing, 0.999))}
+    return {
+        "bytes": subject.query(mesh).tree.bytes / len(mesh[1]),
+        **_parts(rows),
+        "wrong": 1e6 * wrong / count,
+        "ulp_max": float(steep.max()),
+        "ulp_999": float(np.quantile(steep, 0.999)),
+        "ulp_999_grazing": float(np.quantile(grazing, 0.999)),
+    }
 
 
 def _box_errors(subject: Subject, quick: bool) -> dict[str, Any]:
@@ -120,9 +149,11 @@ def _box_errors(subject: Subject, quick: bool) -> dict[str, Any]:
     misses: as for triangles; wrong: per million axis-parallel rays, by float64; lost: per million rays at a plane.
     """
     rows = list(measure_axes(subject, quick=quick))
-    return {**_parts(measure_watertight(subject, quick=quick, rays=RAYS)),
-            "wrong": _a_million(row for row in rows if row.case == "G6"),
-            "lost": _a_million(row for row in rows if row.case == "G7")}
+    return {
+        **_parts(measure_watertight(subject, quick=quick, rays=RAYS)),
+        "wrong": _a_million(row for row in rows if row.case == "G6"),
+        "lost": _a_million(row for row in rows if row.case == "G7"),
+    }
 
 
 def _sphere_errors(subject: Subject, quick: bool) -> dict[str, Any]:
@@ -143,8 +174,11 @@ def _offset_errors(subject: Subject, quick: bool) -> dict[str, Any]:
     rows = list(measure_departures(subject, quick=quick))
     near = [row for row in rows if "in its place" in row.what]
     far = [row for row in rows if row not in near]
-    parts = {f"{wrong}_{name}": _a_million(row for row in some if row.what.endswith(wrong))
-             for name, some in (("near", near), ("far", far)) for wrong in ("dark", "lit")}
+    parts = {
+        f"{wrong}_{name}": _a_million(row for row in some if row.what.endswith(wrong))
+        for name, some in (("near", near), ("far", far))
+        for wrong in ("dark", "lit")
+    }
     return {"wrong": _a_million(rows), **parts}
 
 

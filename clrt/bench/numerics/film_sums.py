@@ -22,7 +22,8 @@ STREAMS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float],
     "far apart": ((1e6, 1e-6, 1e30), (1e6, 1e-6, 1e30), 2),
     "tiny": ((1 / 3, 255.0, 3e-38), (1 / 3, 255.0, 3e-38), 2),
     "two values": ((0.1, 1e-6, 1e-6), (0.7, 1.0, 1e6), 2),
-    "rare peaks": ((1e-6, 0.3, 1.0), (1e6, 1e5, 1e30), 4093)}
+    "rare peaks": ((1e-6, 0.3, 1.0), (1e6, 1e5, 1e30), 4093),
+}
 
 
 class Sums(NamedTuple):
@@ -37,7 +38,7 @@ def accumulate(probe: Probe, often: Doubles, seldom: Doubles, period: int, sampl
     pair = [a.astype(np.float32).astype(np.float64) for a in (often, seldom)]
     state, counts, added = np.zeros((len(often), 12)), np.zeros((len(often), 2)), 0
     if before:
-        state = np.hstack([_split(before * pair[0]), _split(np.minimum(before * pair[0]**2, LARGEST_SUM))])
+        state = np.hstack([_split(before * pair[0]), _split(np.minimum(before * pair[0] ** 2, LARGEST_SUM))])
     while added < samples:
         launch = min(samples - added, LAUNCH - LAUNCH % period)
         out = probe("accumulate", 14, often, seldom, state, samples=launch, period=period)
@@ -45,7 +46,7 @@ def accumulate(probe: Probe, often: Doubles, seldom: Doubles, period: int, sampl
         counts += out[:, 12:]
     pixels = np.zeros((1, len(often)), PIXEL)
     for k, name in enumerate(STATE):
-        pixels[name] = state[None, :, 3 * k:3 * k + 3]
+        pixels[name] = state[None, :, 3 * k : 3 * k + 3]
     pixels["count"], pixels["dropped"] = counts.T[:, None] + [[[before]], [[0]]]
     rare = samples // period
     return Sums(Film(pixels), (pair[0] * (before + samples - rare) + pair[1] * rare) / (before + samples))

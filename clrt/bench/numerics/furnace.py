@@ -20,9 +20,11 @@ SMITHS: tuple[Smith, ...] = get_args(Smith)
 IORS = (1.0, 1.2, 1.5, 2.5, 4.0)
 COLOR = (0.8, 0.5, 0.2)
 #: Rough glass from nearly smooth to the roughest, for every index of refraction, and thin sheets.
-GLASSES = [Dielectric(ior=ior, roughness=roughness, thin=thin)
-           for ior, thin in [*((ior, False) for ior in (0.25, 0.7, 0.99, 1.01, 1.1, 1.33, 1.5, 2.4, 4.0)), (1.5, True)]
-           for roughness in ROUGHNESSES[1:]]
+GLASSES = [
+    Dielectric(ior=ior, roughness=roughness, thin=thin)
+    for ior, thin in [*((ior, False) for ior in (0.25, 0.7, 0.99, 1.01, 1.1, 1.33, 1.5, 2.4, 4.0)), (1.5, True)]
+    for roughness in ROUGHNESSES[1:]
+]
 
 
 #: White layers on top of white materials (LAYERS) and the materials below them (BELOW).
@@ -31,11 +33,19 @@ FILM_ROUGHNESSES, FIBRE_ROUGHNESSES = (0.0, 0.1, 0.3, 0.6, 1.0), (0.1, 0.2, 0.35
 FILMS: list[dict[str, Any]] = [{"clearcoat": 1.0, "clearcoat_roughness": roughness} for roughness in FILM_ROUGHNESSES]
 FIBRES: list[dict[str, Any]] = [{"sheen_color": WHITE, "sheen_roughness": roughness} for roughness in FIBRE_ROUGHNESSES]
 LAYERS: dict[str, list[dict[str, Any]]] = {
-    "a film": FILMS, "fibres": FIBRES, "a film over fibres": [film | fibres for film in FILMS for fibres in FIBRES],
+    "a film": FILMS,
+    "fibres": FIBRES,
+    "a film over fibres": [film | fibres for film in FILMS for fibres in FIBRES],
     "a thin sheet": [{"transmission": transmission} for transmission in (0.5, 1.0)],
-    "a sheet under a film": [{"transmission": 0.5} | film for film in FILMS]}
-BELOW: dict[str, dict[str, Any]] = {"matte": {"specular": 0.0}, "ior 1.5": {}, "ior 3": {"ior": 3.0},
-                                    "half metal": {"metallic": 0.5}, "metal": {"metallic": 1.0}}
+    "a sheet under a film": [{"transmission": 0.5} | film for film in FILMS],
+}
+BELOW: dict[str, dict[str, Any]] = {
+    "matte": {"specular": 0.0},
+    "ior 1.5": {},
+    "ior 3": {"ior": 3.0},
+    "half metal": {"metallic": 0.5},
+    "metal": {"metallic": 1.0},
+}
 #: Closer to the horizon the albedo fits are less accurate, and light from there has negligible weight.
 LAYER_COSINES = tuple(cosine for cosine in COSINES if cosine >= 0.03)
 
@@ -60,9 +70,14 @@ class Kept(NamedTuple):
 
 def measure_metals(device: Device, samples: int, smiths: Iterable[Smith] = SMITHS) -> Iterator[Reflected]:
     """Measure white metals without and with multiple scattering, for every roughness and angle."""
-    metals = [MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness, smith=smith,
-                                multiple_scattering=multiple)
-              for smith in smiths for multiple in (False, True) for roughness in ROUGHNESSES]
+    metals = [
+        MetallicRoughness(
+            color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness, smith=smith, multiple_scattering=multiple
+        )
+        for smith in smiths
+        for multiple in (False, True)
+        for roughness in ROUGHNESSES
+    ]
     subject, numbers = bsdfs(device, [*metals]), evenly(samples)
     for which, metal in enumerate(metals):
         single = albedo(np.array(COSINES), metal.lobes.alpha, metal.smith)
@@ -73,8 +88,12 @@ def measure_metals(device: Device, samples: int, smiths: Iterable[Smith] = SMITH
 
 def measure_plastics(device: Device, samples: int) -> Iterator[Reflected]:
     """Measure white plastics of every roughness and several indices, without and with metal, for every angle."""
-    plastics = [MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=metallic, roughness=roughness, ior=ior)
-                for metallic in (0.0, 0.5) for ior in IORS for roughness in ROUGHNESSES]
+    plastics = [
+        MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=metallic, roughness=roughness, ior=ior)
+        for metallic in (0.0, 0.5)
+        for ior in IORS
+        for roughness in ROUGHNESSES
+    ]
     subject, numbers = bsdfs(device, [*plastics]), evenly(samples)
     for which, plastic in enumerate(plastics):
         for cosine in COSINES:
@@ -83,8 +102,12 @@ def measure_plastics(device: Device, samples: int) -> Iterator[Reflected]:
 
 def measure_layers(device: Device, samples: int, name: str, step: int = 1) -> Iterator[Reflected]:
     """Measure white materials below the layers of a name of LAYERS, using every step-th roughness."""
-    whites = [MetallicRoughness(color=WHITE, roughness=roughness, **below, **layer) for layer in LAYERS[name]
-              for below in BELOW.values() for roughness in ROUGHNESSES[::step]]
+    whites = [
+        MetallicRoughness(color=WHITE, roughness=roughness, **below, **layer)
+        for layer in LAYERS[name]
+        for below in BELOW.values()
+        for roughness in ROUGHNESSES[::step]
+    ]
     subject, numbers = bsdfs(device, [*whites]), evenly(samples)
     for which, white in enumerate(whites):
         for cosine in LAYER_COSINES:

@@ -24,8 +24,11 @@ SIGMAS = 4.5
 #: Fraction of light that a white mesh with interpolated normals may lose; it must not gain any.
 LOST = 0.02
 POINT = Camera(position=(0, 3, 0.001), look_at=(0, 0, 0), up=(0, 0, -1), fov_degrees=0.01)
-FLOOR = Mesh(np.array([[-9, 0, -9], [-9, 0, 9], [9, 0, 9], [9, 0, -9]], np.float32),
-             np.array([[0, 1, 2], [0, 2, 3]], np.int32), Diffuse(color=(ALBEDO, ALBEDO, ALBEDO)))
+FLOOR = Mesh(
+    np.array([[-9, 0, -9], [-9, 0, 9], [9, 0, 9], [9, 0, -9]], np.float32),
+    np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+    Diffuse(color=(ALBEDO, ALBEDO, ALBEDO)),
+)
 
 
 def measure_pictures(subject: Subject, *, quick: bool) -> Iterator[Row]:
@@ -35,16 +38,26 @@ def measure_pictures(subject: Subject, *, quick: bool) -> Iterator[Row]:
         film = subject.film(replace(scene, camera=POINT, render=settings))
         mean, count = film.mean[..., 0], film.pixels["count"].astype(np.float64)
         squares = (film.pixels["square"].astype(np.float64) + film.pixels["square_error"])[..., 0]
-        variance = np.maximum(squares / count - mean**2, 0).mean() / count.sum() + (1e-6 * expected)**2
+        variance = np.maximum(squares / count - mean**2, 0).mean() / count.sum() + (1e-6 * expected) ** 2
         sigmas = abs(mean.mean() - expected) / np.sqrt(variance)
         yield Row(case, what, int(count.sum()), int(sigmas > SIGMAS), float(sigmas), "standard errors")
     mirrored = subject.picture(mirrored_lamp(), 4)
     yield Row("L3", "area light in a mirror keeps its radiance", mirrored.size, int(np.count_nonzero(mirrored != 2.5)))
     ball = subject.picture(white_ball(64 if quick else 256), 64 if quick else 256)
-    yield Row("L5", "white sphere of 80 triangles, smooth normals: gains light", ball.size // 3,
-              int(np.count_nonzero(ball[..., 0] > 1 + 1e-5)))
-    yield Row("L5", "white sphere of 80 triangles, smooth normals: loses more than 2 %", 1, int(1 - ball.mean() > LOST),
-              float(1 - ball.mean()), "lost")
+    yield Row(
+        "L5",
+        "white sphere of 80 triangles, smooth normals: gains light",
+        ball.size // 3,
+        int(np.count_nonzero(ball[..., 0] > 1 + 1e-5)),
+    )
+    yield Row(
+        "L5",
+        "white sphere of 80 triangles, smooth normals: loses more than 2 %",
+        1,
+        int(1 - ball.mean() > LOST),
+        float(1 - ball.mean()),
+        "lost",
+    )
 
 
 def lit_points() -> Iterator[tuple[str, str, Scene, float]]:
@@ -57,19 +70,25 @@ def lit_points() -> Iterator[tuple[str, str, Scene, float]]:
         yield "L9" if radius > 0.1 else "L3", name, scene, ALBEDO * 2 * radius**2 * 2 / d2**1.5
     centers = [(x, 2.0, z) for x in np.linspace(-5, 5, 32) for z in np.linspace(-5, 5, 31)]
     lamps = [_lamp(center, 0.02, 10.0 * (1 + i % 7)) for i, center in enumerate(centers)]
-    total = sum(ALBEDO * ball.material.radiance[0] * 0.02**2 * 2 / (4 + ball.center[0]**2 + ball.center[2]**2)**1.5
-                for ball in lamps)
+    total = sum(
+        ALBEDO * ball.material.radiance[0] * 0.02**2 * 2 / (4 + ball.center[0] ** 2 + ball.center[2] ** 2) ** 1.5
+        for ball in lamps
+    )
     yield "L3", f"{len(lamps)} lamps", Scene(meshes=[FLOOR], spheres=lamps), total
     sky = np.full((256, 512, 3), 0.5, np.float32)
     sky[60:62, 100:102] = 5e4
-    yield "L3", "a sky with a sun of four pixels", Scene(meshes=[FLOOR], environment=Environment(image=sky)), \
-        ALBEDO / np.pi * sky_irradiance(sky[..., 0].astype(np.float64))
+    yield (
+        "L3",
+        "a sky with a sun of four pixels",
+        Scene(meshes=[FLOOR], environment=Environment(image=sky)),
+        ALBEDO / np.pi * sky_irradiance(sky[..., 0].astype(np.float64)),
+    )
 
 
 def sky_irradiance(texels: Doubles, fine: int = 8) -> float:
     """Return a floor's irradiance by quadrature: fine² bilinear points per texel (h, w), v clamped at the poles."""
     height, width = texels.shape
-    row = (np.arange(height * fine // 2) + 0.5) / fine - 0.5   # up to the horizon
+    row = (np.arange(height * fine // 2) + 0.5) / fine - 0.5  # up to the horizon
     column = (np.arange(width * fine) + 0.5) / fine - 0.5
     below, left = np.floor(row).astype(int), np.floor(column).astype(int)
     v, u = (row - below)[:, None], column - left
@@ -84,8 +103,12 @@ def mirrored_lamp() -> Scene:
     """Return a scene whose image is filled by a mirror that reflects an area light."""
     mirror = Mesh(FLOOR.vertices, FLOOR.faces, Mirror())
     camera = Camera(position=(0, 3, 3), look_at=(0, 0, 0), fov_degrees=10)
-    return Scene(meshes=[mirror], spheres=[_lamp((0, 4, -4), 2.5, 2.5)], camera=camera,
-                 render=RenderSettings(size=(64, 64), max_depth=4))
+    return Scene(
+        meshes=[mirror],
+        spheres=[_lamp((0, 4, -4), 2.5, 2.5)],
+        camera=camera,
+        render=RenderSettings(size=(64, 64), max_depth=4),
+    )
 
 
 def white_ball(side: int) -> Scene:

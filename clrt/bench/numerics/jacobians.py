@@ -85,7 +85,7 @@ def check_density(bsdfs: Bsdfs, which: int, cosine: float) -> Checked:
         return wi, pdf
 
     known, error, single = 0, 0.0, False
-    tried = np.linspace(0, 1 - 2.0**-24, LOBES)     # the least likely lobes are at the ends
+    tried = np.linspace(0, 1 - 2.0**-24, LOBES)  # the least likely lobes are at the ends
     folds = "DIELECTRIC_ENERGY" in bsdfs.materials[which].features()
     every = draw(np.repeat(u, LOBES, axis=0), np.tile(tried, len(u)))[0].reshape(len(u), LOBES, 3)
     lobes = _numbers_of_lobes(every[0], tried)
@@ -94,7 +94,7 @@ def check_density(bsdfs: Bsdfs, which: int, cosine: float) -> Checked:
         single = not folds and bool((every == every[:, :1]).all())
         told = (pdf > 0) & (wi[:, 2] != 0) & (area.error < LEAST_KNOWN)
         moved = draw((u[:, None] + MOVES).reshape(-1, 2), lobe)[0].reshape(len(u), -1, 3)
-        told &= (moved[..., 2] * wi[:, 2:] > 0).all(axis=1)    # slopes are meaningless if a lobe ends in between
+        told &= (moved[..., 2] * wi[:, 2:] > 0).all(axis=1)  # slopes are meaningless if a lobe ends in between
         same = np.all(every == wi[:, None], axis=2).sum(axis=1)[told]
         part = np.ones(len(same)) if single else np.maximum(same - 1, 0) / LOBES
         lacks = np.where(part > 0, 1 - pdf[told] * area.scale[told] / np.maximum(part, 1 / LOBES), 0)

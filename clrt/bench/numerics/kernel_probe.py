@@ -34,8 +34,9 @@ class Probe:
     chosen: see `choices`.
     """
 
-    def __init__(self, device: Device, scene: Scene, defines: str = "", changes: Mapping[str, str] | None = None,
-                 **chosen: Any) -> None:
+    def __init__(
+        self, device: Device, scene: Scene, defines: str = "", changes: Mapping[str, str] | None = None, **chosen: Any
+    ) -> None:
         self.compiled = compile_scene(scene, choices(device, **chosen), "bench/probe.cl")
         source = f"{defines}\n{self.compiled.source}"
         for text, other in (changes or {}).items():
@@ -54,7 +55,13 @@ class Probe:
         n = given.shape[1]
         answer = empty_array(device, np.float32, rows * n)
         kernel, source = make_kernel(device, self._program, f"probe_{entry}"), on_device(device, given)
-        kernel.set_args(*self._scene, self.compiled.counts[0], np.uint32(n), source, answer.buffer,
-                        *map(np.uint32, scalars.values()))
+        kernel.set_args(
+            *self._scene,
+            self.compiled.counts[0],
+            np.uint32(n),
+            source,
+            answer.buffer,
+            *map(np.uint32, scalars.values()),
+        )
         run_kernel(device, kernel, -(-n // (self.compiled.choices.lanes * device.local_size)))
         return answer.read(device).reshape(rows, n).T.astype(np.float64)

@@ -19,13 +19,22 @@ from .warps import triangle_test, uniform_test
 LAMP = Diffuse(emission=(1.0, 1.0, 1.0))
 UP = (0.0, 1.0, 0.0)
 #: Centers and radii of spheres seen from the origin: large, almost touching it, small, tiny and far.
-SPHERES = (((0.0, 0.0, 3.0), 2.0), ((0.0, 0.0, 1.0001), 1.0), ((3.0, -4.0, 12.0), 2.0), ((3.0, -4.0, 12.0), 0.05),
-           ((0.0, 0.0, 1e4), 1.0), ((0.0, 0.0, 10.0), 1e-6), ((0.0, 0.0, 1e5 + 1.0), 1e5))
+SPHERES = (
+    ((0.0, 0.0, 3.0), 2.0),
+    ((0.0, 0.0, 1.0001), 1.0),
+    ((3.0, -4.0, 12.0), 2.0),
+    ((3.0, -4.0, 12.0), 0.05),
+    ((0.0, 0.0, 1e4), 1.0),
+    ((0.0, 0.0, 10.0), 1e-6),
+    ((0.0, 0.0, 1e5 + 1.0), 1e5),
+)
 #: Vertices of triangles that face the origin: large and near, grazing, a sliver, small and far.
-TRIANGLES = (((-2.0, -1.0, 1.0), (0.5, 2.0, 1.5), (3.0, -1.0, 2.0)),
-             ((-1.0, 0.01, 1.0), (1.0, 0.01, 1.0), (0.0, 0.012, 3.0)),
-             ((-1.0, 0.0, 2.0), (0.0, 1e-4, 2.0), (1.0, 0.0, 2.0)),
-             ((-1e-3, -1e-3, 1e2), (0.0, 1e-3, 1e2), (1e-3, -1e-3, 1e2)))
+TRIANGLES = (
+    ((-2.0, -1.0, 1.0), (0.5, 2.0, 1.5), (3.0, -1.0, 2.0)),
+    ((-1.0, 0.01, 1.0), (1.0, 0.01, 1.0), (0.0, 0.012, 3.0)),
+    ((-1.0, 0.0, 2.0), (0.0, 1e-4, 2.0), (1.0, 0.0, 2.0)),
+    ((-1e-3, -1e-3, 1e2), (0.0, 1e-3, 1e2), (1e-3, -1e-3, 1e2)),
+)
 #: Cells per texel along each side.
 PARTS = 2
 
@@ -67,7 +76,7 @@ def _sampled(probe: Probe, samples: int, seed: int) -> tuple[Doubles, Doubles]:
 def _cone(wi: Doubles, pdf: Doubles, center: Doubles, radius: float) -> tuple[float, float]:
     """Test for uniformity in 1 − cos of the angle to the sphere's center, and in the azimuth around it."""
     center = center.astype(np.float32).astype(np.float64)
-    sin2_max = (np.float64(np.float32(radius)) / np.linalg.norm(center))**2
+    sin2_max = (np.float64(np.float32(radius)) / np.linalg.norm(center)) ** 2
     height = sin2_max / (1 + np.sqrt(1 - sin2_max))
     n = center / np.linalg.norm(center)
     s = np.cross(n, [0.0, 1.0, 0.0]) / np.linalg.norm(np.cross(n, [0.0, 1.0, 0.0]))
@@ -108,7 +117,7 @@ def skies(device: Device, samples: int, seed: int, changes: Mapping[str, str] | 
 def _pictures() -> dict[str, tuple[NDArray[np.float32], float]]:
     """Return environment maps (height, width, 3), and their rotations in degrees."""
     rng = np.random.default_rng(1)
-    uneven = (rng.uniform(0.1, 2.0, (16, 32, 3)) * rng.random((16, 32, 1))**8).astype(np.float32)
+    uneven = (rng.uniform(0.1, 2.0, (16, 32, 3)) * rng.random((16, 32, 1)) ** 8).astype(np.float32)
     sun = uneven.copy()
     sun[4, 20] = 1e5
     return {"uneven": (uneven, 0.0), "turned": (uneven, 77.0), "sun": (sun, -130.0), "one row": (uneven[:1], 10.0)}
@@ -131,7 +140,7 @@ def picks(device: Device, samples: int, seed: int, changes: Mapping[str, str] | 
     for k, (name, lights) in enumerate(_lights().items()):
         probe = Probe(device, Scene(lights=lights), changes=changes)
         rows = np.tile([0.0, 0.0, 0.0, *UP], (max(samples, len(lights)), 1))
-        mass = probe("light_probability", 1, rows[:len(lights)], np.arange(len(lights)))[:, 0]
+        mass = probe("light_probability", 1, rows[: len(lights)], np.arange(len(lights)))[:, 0]
         picked = probe("pick_light", 3, rows[:samples], seed=seed + k)[:, 0].astype(int)
         density = chi2_test(np.bincount(picked, minlength=len(lights)), mass / mass.sum() * samples)
         yield LightTest(f"choice of {name}", density, float(abs(mass.sum() - 1)))
@@ -141,13 +150,17 @@ def _lights() -> dict[str, list[Light]]:
     """Return point lights in all directions, and infinite lights."""
     rng = np.random.default_rng(7)
     suns: list[Light] = [DirectionalLight(direction=(x, -1.0, 0.5), irradiance=(1.0, 0.5, 1.0)) for x in range(3)]
-    return {f"{count} lights, {k} infinite": [*_points(rng, count), *suns[:k]]
-            for count, k in ((2, 0), (7, 1), (32, 3), (33, 0), (300, 2), (20_000, 0))}
+    return {
+        f"{count} lights, {k} infinite": [*_points(rng, count), *suns[:k]]
+        for count, k in ((2, 0), (7, 1), (32, 3), (33, 0), (300, 2), (20_000, 0))
+    }
 
 
 def _points(rng: np.random.Generator, count: int) -> list[Light]:
     """Return point lights, about half of them below the surface at the origin, and some at the same position."""
     places = rng.normal(size=(count, 3))
-    places[:2, 1], places[:count // 10] = 1.0, places[0]
-    return [PointLight(position=(x, y, z), intensity=(power, power, power))
-            for (x, y, z), power in zip(places.tolist(), rng.pareto(2.0, count).tolist())]
+    places[:2, 1], places[: count // 10] = 1.0, places[0]
+    return [
+        PointLight(position=(x, y, z), intensity=(power, power, power))
+        for (x, y, z), power in zip(places.tolist(), rng.pareto(2.0, count).tolist())
+    ]

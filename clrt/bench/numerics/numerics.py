@@ -24,8 +24,16 @@ from .row import Row
 from .samplers import measure_samplers
 
 GEOMETRY: tuple[Callable[..., Iterator[Row]], ...] = (
-    measure_watertight, measure_scales, measure_slivers, measure_distances, measure_axes, measure_degenerate,
-    measure_departures, measure_spheres, measure_instances)
+    measure_watertight,
+    measure_scales,
+    measure_slivers,
+    measure_distances,
+    measure_axes,
+    measure_degenerate,
+    measure_departures,
+    measure_spheres,
+    measure_instances,
+)
 
 
 def chosen_devices(device: str | int | None) -> list[int]:

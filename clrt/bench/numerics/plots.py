@@ -67,8 +67,16 @@ def plot_convergence(path: Path, results: Sequence[Mapping[str, Any]], devices: 
     for row in axes:
         row[0].set_ylabel("error (√relMSE)")
     marks = {label: mark for axis in axes.flat for mark, label in zip(*axis.get_legend_handles_labels())}
-    figure.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=1 + len(results), frameon=False,
-                  fontsize="small", title="\n".join(devices), title_fontsize="x-small")
+    figure.legend(
+        marks.values(),
+        marks.keys(),
+        loc="outside lower center",
+        ncols=1 + len(results),
+        frameon=False,
+        fontsize="small",
+        title="\n".join(devices),
+        title_fontsize="x-small",
+    )
     return write_figure(path, figure)
 
 
@@ -77,8 +85,15 @@ def _draw_convergence(axis: Axes, result: Mapping[str, Any], names: Sequence[str
     slope: list[tuple[float, float]] = []
     for place, name in enumerate(names):
         row = result["contestants"].get(name)
-        points = [] if row is None else [(x, sqrt(y), sqrt(max(low, 0)), sqrt(high)) for x, y, (low, high) in zip(
-            row[key], row["relmse"], row["relmse_range"]) if x > 0 and y > 0]
+        points = (
+            []
+            if row is None
+            else [
+                (x, sqrt(y), sqrt(max(low, 0)), sqrt(high))
+                for x, y, (low, high) in zip(row[key], row["relmse"], row["relmse_range"])
+                if x > 0 and y > 0
+            ]
+        )
         if points:
             x, y, low, high = zip(*points)
             color = COLORS[place % len(COLORS)]
@@ -103,8 +118,14 @@ def plot_theses(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
         for key, style in (("seconds", "o-"), ("theirs", "s:")):
             points = _depths(result, key)
             start = dict(points).get(4, points[0][1]) if points else 0.0
-            curves.plot([depth for depth, _ in points], [start / seconds for _, seconds in points], style, color=color,
-                        markersize=4, label=result["name"] + (f", {result['thesis']}" if key == "theirs" else ""))
+            curves.plot(
+                [depth for depth, _ in points],
+                [start / seconds for _, seconds in points],
+                style,
+                color=color,
+                markersize=4,
+                label=result["name"] + (f", {result['thesis']}" if key == "theirs" else ""),
+            )
     curves.set(xscale="log", xlabel="mirror depth", ylabel="frames per second over those at depth 4", ylim=(0, None))
     curves.set_xticks(ticks := [1, 2, 4, 10, 25, 40], [str(tick) for tick in ticks])
     curves.minorticks_off()
@@ -114,8 +135,11 @@ def plot_theses(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
 
 
 def _draw_ratios(axis: Axes, results: Sequence[Mapping[str, Any]]) -> None:
-    ratios = [(f"{result['name']}: {ratio['of']}\n/ {ratio['over']}", ratio["ours"], ratio["theirs"])
-              for result in results for ratio in result["ratios"]][::-1]
+    ratios = [
+        (f"{result['name']}: {ratio['of']}\n/ {ratio['over']}", ratio["ours"], ratio["theirs"])
+        for result in results
+        for ratio in result["ratios"]
+    ][::-1]
     for row, (_, ours, theirs) in enumerate(ratios):
         for value, place, color in ((ours, row + 0.18, COLORS[0]), (theirs, row - 0.18, "grey")):
             if value:

@@ -18,9 +18,28 @@ Draw = Callable[[ArrayLike, ArrayLike, ArrayLike, ArrayLike], Doubles]
 #: where 31 and 32 bits overflow; there the indices wrap around to 0.
 MIDDLES = (1 << 23, 1 << 24, 1 << 26, 1 << 31, 1 << 32)
 #: Offsets (pixel, sample, dimension, seed) of compared numbers: neighbors, diagonals, image rows, powers of two.
-STEPS = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (2, 0, 0, 0), (64, 0, 0, 0), (1920, 0, 0, 0),
-         (8192, 0, 0, 0), (1 << 16, 0, 0, 0), (1 << 30, 0, 0, 0), (0, 64, 0, 0), (0, 1 << 30, 0, 0), (0, 0, 2, 0),
-         (0, 0, 0, 1 << 30), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, -1, 0), (0, 1, -1, 0), (1, 0, 0, -1), (0, 1, 0, -1))
+STEPS = (
+    (1, 0, 0, 0),
+    (0, 1, 0, 0),
+    (0, 0, 1, 0),
+    (0, 0, 0, 1),
+    (2, 0, 0, 0),
+    (64, 0, 0, 0),
+    (1920, 0, 0, 0),
+    (8192, 0, 0, 0),
+    (1 << 16, 0, 0, 0),
+    (1 << 30, 0, 0, 0),
+    (0, 64, 0, 0),
+    (0, 1 << 30, 0, 0),
+    (0, 0, 2, 0),
+    (0, 0, 0, 1 << 30),
+    (1, 1, 0, 0),
+    (1, -1, 0, 0),
+    (1, 0, -1, 0),
+    (0, 1, -1, 0),
+    (1, 0, 0, -1),
+    (0, 1, 0, -1),
+)
 #: Cells per side of a square, and of a hypercube.
 SIDE, EDGE = 16, 6
 #: Number of samples, dimensions and seeds that are tested per pixel.
@@ -37,7 +56,7 @@ def draw_on(probe: Probe) -> Draw:
         for i, (d, s) in enumerate(scalars.tolist()):
             rows = group.ravel() == i
             p, q = grid[0][rows], grid[1][rows]
-            out[rows] = probe("random", 2, p >> 16, p & 0xffff, q >> 16, q & 0xffff, seed=s, dimension=d, block_bits=32)
+            out[rows] = probe("random", 2, p >> 16, p & 0xFFFF, q >> 16, q & 0xFFFF, seed=s, dimension=d, block_bits=32)
         return out
 
     return draw
@@ -52,8 +71,10 @@ def uniformity(draw: Draw, count: int) -> dict[str, float]:
             u = draw(*walk)
             p_values[f"{name} around {middle}"] = _square_test(*u.T)
             ones = np.mean((u * (1 << 24)).astype(np.int64)[:, :, None] >> np.arange(24) & 1, axis=0).ravel()
-            p_values |= {f"bit {bit}, {name} around {middle}": float(p)
-                         for bit, p in enumerate(mean_test(ones, 0.25, count, 0.5))}
+            p_values |= {
+                f"bit {bit}, {name} around {middle}": float(p)
+                for bit, p in enumerate(mean_test(ones, 0.25, count, 0.5))
+            }
         i = middle - count // 2 + np.arange(count)
         first = draw(i, 0, 0, 0)
         p_values[f"four numbers of a pixel, {middle}"] = _cube_test(first, draw(i, 0, 1, 0))
@@ -84,8 +105,9 @@ def repetitions(draw: Draw, side: int) -> int:
     The expected number is below one: pairs have 48 bits.
     """
     pixel, sample = (grid.ravel() for grid in np.meshgrid(np.arange(side), np.arange(side) + 1_000_000))
-    u = np.concatenate([draw(pixel, sample, 0, 0), draw(sample, pixel, 0, 0), draw(pixel, sample, 0, 1),
-                        draw(pixel, sample, 1, 0)])
+    u = np.concatenate(
+        [draw(pixel, sample, 0, 0), draw(sample, pixel, 0, 0), draw(pixel, sample, 0, 1), draw(pixel, sample, 1, 0)]
+    )
     pairs = (u * (1 << 24)).astype(np.int64) @ [1 << 24, 1]
     return len(pairs) - len(np.unique(pairs))
 
@@ -94,8 +116,14 @@ def _walks(start: int, count: int) -> dict[str, tuple[ArrayLike, ...]]:
     """Return (pixel, sample, dimension, seed) along which numbers are drawn, by name."""
     i = start + np.arange(count)
     few, many = np.arange(count) % FEW, start + np.arange(count) // FEW
-    return {"pixels": (i, 3, 2, 1), "samples": (7, i, 2, 1), "pixels and samples": (many, few, 0, 0),
-            "dimensions": (many, 5, few, 1), "seeds": (many, 5, 1, 1000 * few), "large seeds": (many, 5, 1, -1 - few)}
+    return {
+        "pixels": (i, 3, 2, 1),
+        "samples": (7, i, 2, 1),
+        "pixels and samples": (many, few, 0, 0),
+        "dimensions": (many, 5, few, 1),
+        "seeds": (many, 5, 1, 1000 * few),
+        "large seeds": (many, 5, 1, -1 - few),
+    }
 
 
 def _square_test(x: Doubles, y: Doubles) -> float:

@@ -78,8 +78,15 @@ def scatter(bsdfs: Bsdfs, which: int, cosine: float, samples: int, seed: int) ->
     error = max(error, float(np.max(np.abs(pdf[kept][sided] / density[sided] - 1), initial=0.0)))
     chart = chart_of(bsdfs, which, wo)
     expected = chart.integrate(lambda w: bsdfs.value(which, wo, w)[1])
-    return Scattered(name, density_test(chart, wi[kept], expected, samples), float(expected.sum()), 1 - kept.mean(),
-                     _energy(weight), error, int(wrong.sum()))
+    return Scattered(
+        name,
+        density_test(chart, wi[kept], expected, samples),
+        float(expected.sum()),
+        1 - kept.mean(),
+        _energy(weight),
+        error,
+        int(wrong.sum()),
+    )
 
 
 @dataclass(frozen=True)
@@ -95,8 +102,11 @@ class Chart:
         if not self.through:
             return sphere_cells.count(self.wo, wi)
         down = wi[:, 2] < 0
-        under = (sphere_cells.count(self.wo, wi[down] * FLIP) if self.center is None
-                 else sphere_cells.count_below(self.center, wi[down]))
+        under = (
+            sphere_cells.count(self.wo, wi[down] * FLIP)
+            if self.center is None
+            else sphere_cells.count_below(self.center, wi[down])
+        )
         return np.concatenate([sphere_cells.count(self.wo, wi[~down]), under])
 
     def integrate(self, density: Callable[[Doubles], Doubles]) -> Doubles:
@@ -104,8 +114,11 @@ class Chart:
         above = sphere_cells.integrate(density, self.wo, self.through)
         if not self.through:
             return above
-        under = (sphere_cells.integrate(lambda w: density(w * FLIP), self.wo, True) if self.center is None
-                 else sphere_cells.integrate_below(density, self.center))
+        under = (
+            sphere_cells.integrate(lambda w: density(w * FLIP), self.wo, True)
+            if self.center is None
+            else sphere_cells.integrate_below(density, self.center)
+        )
         return np.concatenate([above, under])
 
 
@@ -160,7 +173,7 @@ def reciprocity(bsdfs: Bsdfs, which: int, count: int, seed: int) -> Doubles:
 def above(count: int, seed: int) -> Doubles:
     """Return (count, 3) unit vectors of the upper hemisphere in float32: half uniform, half with z down to 1e-4."""
     rng = np.random.default_rng(seed)
-    z = np.where(np.arange(count) % 2, rng.uniform(1e-3, 1, count), 10**rng.uniform(-4, -1, count))
+    z = np.where(np.arange(count) % 2, rng.uniform(1e-3, 1, count), 10 ** rng.uniform(-4, -1, count))
     azimuth, sine = rng.uniform(0, 2 * np.pi, count), np.sqrt(1 - z * z)
     unit = np.column_stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z])
     return unit.astype(np.float32).astype(np.float64)

@@ -51,7 +51,7 @@ def integrate(density: Callable[[Doubles], Doubles], wo: Doubles, edged: bool = 
     h = np.column_stack([r * np.cos(azimuth), r * np.sin(azimuth), np.ones(len(r))]) / np.sqrt(1 + r * r)[:, None]
     cosine = h @ wo
     # dωi = 4 (wo·h) dωh, and dωh = cos³θ times the area of slopes r dr dphi = r² d(log r) dphi.
-    jacobian = 4 * cosine * h[:, 2]**3 * r * r
+    jacobian = 4 * cosine * h[:, 2] ** 3 * r * r
     values = density(2 * cosine[:, None] * h - wo) * jacobian
     parts = values.reshape(ROWS, len(nodes), COLUMNS * len(TURNS)) * width * weights[:, None] / 2
     sums = parts.sum(axis=1).reshape(ROWS, COLUMNS, len(TURNS)) @ weight

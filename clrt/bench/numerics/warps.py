@@ -40,10 +40,12 @@ def _closed_forms(probe: Probe, samples: int, seed: int) -> Iterator[tuple[str, 
         out = probe("warps", 12, u, np.full(samples, height))
         wi = out[:, 4:7]
         # Computed from the sine: for small cones cos θ is 1 in float32.
-        sin2 = wi[:, 0]**2 + wi[:, 1]**2
-        yield f"cone of 1 - cos = {height:g}", uniform_test(
-            np.where(wi[:, 2] > 0, sin2 / (1 + np.abs(wi[:, 2])), 1 - wi[:, 2]) / height, turn(wi))
-    yield "cosine", uniform_test(out[:, 0]**2 + out[:, 1]**2, turn(out[:, :3]))
+        sin2 = wi[:, 0] ** 2 + wi[:, 1] ** 2
+        yield (
+            f"cone of 1 - cos = {height:g}",
+            uniform_test(np.where(wi[:, 2] > 0, sin2 / (1 + np.abs(wi[:, 2])), 1 - wi[:, 2]) / height, turn(wi)),
+        )
+    yield "cosine", uniform_test(out[:, 0] ** 2 + out[:, 1] ** 2, turn(out[:, :3]))
     yield "triangle", triangle_test(out[:, 8], out[:, 9])
 
 
@@ -54,7 +56,8 @@ def warp_density_errors(probe: Probe) -> dict[str, float]:
     for height in HEIGHTS:
         out = probe("warps", 12, u, np.full(len(u), height))
         errors[f"cone of 1 - cos = {height:g}"] = missed(
-            lambda at: probe("warps", 12, at, np.full(len(at), height))[:, 4:7], u, out[:, 7])
+            lambda at: probe("warps", 12, at, np.full(len(at), height))[:, 4:7], u, out[:, 7]
+        )
     errors["cosine"] = missed(lambda at: probe("warps", 12, at, np.ones(len(at)))[:, :3], u, out[:, 3])
     for alpha in ALPHAS:
         for cosine in COSINES:
@@ -95,8 +98,10 @@ def _visible_normals(probe: Probe, samples: int, seed: int) -> Iterator[tuple[st
             phi = (turn(h) - np.arctan2(wo[1], wo[0]) / (2 * np.pi)) % 1
             cells = [np.minimum((SIDE * a).astype(int), SIDE - 1) for a in (psi / (np.pi / 2), phi)]
             counts = np.bincount(cells[0] * SIDE + cells[1], minlength=SIDE**2)
-            yield (f"visible normals of alpha {alpha:g} from cos {cosine:g}",
-                   chi2_test(counts, visible_normals(float(np.float32(alpha)), wo).ravel() * samples))
+            yield (
+                f"visible normals of alpha {alpha:g} from cos {cosine:g}",
+                chi2_test(counts, visible_normals(float(np.float32(alpha)), wo).ravel() * samples),
+            )
 
 
 def visible_normals(alpha: float, wo: Doubles) -> Doubles:
@@ -112,14 +117,14 @@ def visible_normals(alpha: float, wo: Doubles) -> Doubles:
     k = slope * np.cos(phi)
     last = np.where(k < 0, np.arctan2(1, -k), np.pi / 2)
     psi = np.minimum(np.linspace(0, np.pi / 2, SIDE + 1)[:, None, None], last)
-    below = np.sin(psi)**2 + k * (psi - np.sin(psi) * np.cos(psi))
+    below = np.sin(psi) ** 2 + k * (psi - np.sin(psi) * np.cos(psi))
     shadowed = 2 / (1 + np.sqrt(1 + slope**2))
     return np.asarray(np.maximum(np.diff(below, axis=0), 0) @ weight * shadowed / SIDE)
 
 
 def _density(h: Doubles, alpha: float, wo: Doubles) -> Doubles:
     """Return D·max(0, wo·h)/(cos wo·(1 + Λ)), (n,), for unit normals h (n, 3)."""
-    a2 = float(np.float32(alpha))**2
-    d = a2 / (np.pi * (h[:, 0]**2 + h[:, 1]**2 + a2 * h[:, 2]**2)**2)
-    stretched = np.sqrt(a2 * (wo[0]**2 + wo[1]**2) + wo[2]**2)
+    a2 = float(np.float32(alpha)) ** 2
+    d = a2 / (np.pi * (h[:, 0] ** 2 + h[:, 1] ** 2 + a2 * h[:, 2] ** 2) ** 2)
+    stretched = np.sqrt(a2 * (wo[0] ** 2 + wo[1] ** 2) + wo[2] ** 2)
     return np.asarray(2 * d * np.maximum(h @ wo, 0) / (wo[2] + stretched))

@@ -39,8 +39,9 @@ KINDS = ("primary", "bounce", "shadow")
 RAYS, QUICK_RAYS = (512, 512), (64, 64)
 
 
-def measure_build(vertices: Floats, faces: Faces, *, quick: bool = False,
-                  device: str | int | None = None) -> Iterator[tuple[str, dict[str, Any]]]:
+def measure_build(
+    vertices: Floats, faces: Faces, *, quick: bool = False, device: str | int | None = None
+) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the results of `clrt bench build`, part by part, for the mesh (n, 3), (m, 3) in a closed room.
 
     size: see `measure_builders`, for each number of triangles; rays: see `measure_growth`; fresh: `measure_fresh` with
@@ -84,15 +85,20 @@ def measure_builders(scene: Mesh, device: Device) -> dict[str, Any]:
         try:
             seconds, facts = build()
         except UsageError:
-            continue    # not every builder supports every layout, and Embree may be missing
+            continue  # not every builder supports every layout, and Embree may be missing
         builds[name] = build
         figures[name] = {"seconds": seconds, "first_seconds": time.perf_counter() - start, **facts}
     for name, seconds in _in_turns(builds).items():
         figures[name] |= {"seconds": seconds, "mtriangles": 1e-6 * len(triangles) / seconds}
         if REFERENCE in figures and name != EMBREE:
             figures[name]["cost_ratio"] = figures[name]["sah_cost"] / figures[REFERENCE]["sah_cost"]
-    return {"device": device.info.name, "platform": device.info.platform, "triangles": len(triangles),
-            "layout": device.layout, "builders": figures}
+    return {
+        "device": device.info.name,
+        "platform": device.info.platform,
+        "triangles": len(triangles),
+        "layout": device.layout,
+        "builders": figures,
+    }
 
 
 Build = Callable[[], tuple[float, dict[str, Any]]]
@@ -100,6 +106,7 @@ Build = Callable[[], tuple[float, dict[str, Any]]]
 
 def _builds(scene: Mesh, triangles: Floats, device: Device) -> dict[str, Build]:
     """Return functions that build a BVH once and return the seconds and further properties."""
+
     def ours(name: str) -> tuple[float, dict[str, Any]]:
         tree = build_tree(device, device.layout, name, triangles)
         return tree.build_seconds, _facts(tree, len(triangles))
@@ -114,8 +121,14 @@ def _builds(scene: Mesh, triangles: Floats, device: Device) -> dict[str, Build]:
 
 
 def _facts(tree: Layout, count: int) -> dict[str, Any]:
-    return {"sah_cost": tree.sah_cost, "nodes": tree.nodes, "depth": tree.depth, "stack": tree.stack,
-            "bytes_per_triangle": tree.bytes / count, "peak_bytes_per_triangle": tree.peak_bytes / count or None}
+    return {
+        "sah_cost": tree.sah_cost,
+        "nodes": tree.nodes,
+        "depth": tree.depth,
+        "stack": tree.stack,
+        "bytes_per_triangle": tree.bytes / count,
+        "peak_bytes_per_triangle": tree.peak_bytes / count or None,
+    }
 
 
 def _in_turns(builds: dict[str, Build]) -> dict[str, float]:
@@ -135,8 +148,10 @@ def measure_growth(queries: dict[int, RayQuery], kinds: dict[int, list[Workload]
     """
     races, fits = {}, {}
     for each in zip(*kinds.values()):
-        runs = {size: Run(query, query.any_hit if kind.any_hit else query.closest_hit, kind.rays)
-                for (size, query), kind in zip(queries.items(), each)}
+        runs = {
+            size: Run(query, query.any_hit if kind.any_hit else query.closest_hit, kind.rays)
+            for (size, query), kind in zip(queries.items(), each)
+        }
         name = each[0].name
         races[name] = race({str(size): Contestant(run, len(run.answers)) for size, run in runs.items()}, ROUNDS)
         fits[name] = fit_logarithm(list(queries), [1e-6 / row["mrays"] for row in races[name].values()])

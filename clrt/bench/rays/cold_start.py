@@ -38,8 +38,9 @@ def measure_fresh(scene: Mesh, rays: Rays, cache: Path | None = None, **options:
         np.savez(Path(folder) / ARRAYS, *scene, *rays)
         (Path(folder) / OPTIONS).write_text(json.dumps(options))
         caches = {} if cache is None else dict.fromkeys(CACHES, str(cache))
-        done = subprocess.run([sys.executable, "-m", __name__, folder], env=os.environ | caches, text=True,
-                              capture_output=True)
+        done = subprocess.run(
+            [sys.executable, "-m", __name__, folder], env=os.environ | caches, text=True, capture_output=True
+        )
         if done.returncode:
             raise ClrtError(f"a new process that builds a BVH exited with {done.returncode}: {done.stderr.strip()}")
         figures: dict[str, Any] = json.loads((Path(folder) / FIGURES).read_text())
@@ -54,9 +55,13 @@ def answer(folder: Path) -> None:
     query = RayQuery(vertices, faces, **json.loads((folder / OPTIONS).read_text()))
     built = time.perf_counter()
     hits = query.closest_hit(*rays)
-    figures = {"build_seconds": built - start, "tree_seconds": query.tree.build_seconds,
-               "answer_seconds": time.perf_counter() - built, "hits": int(np.sum(hits["primitive"] >= 0)),
-               "peak_bytes": peak_bytes()}
+    figures = {
+        "build_seconds": built - start,
+        "tree_seconds": query.tree.build_seconds,
+        "answer_seconds": time.perf_counter() - built,
+        "hits": int(np.sum(hits["primitive"] >= 0)),
+        "peak_bytes": peak_bytes(),
+    }
     (folder / FIGURES).write_text(json.dumps(figures))
 
 

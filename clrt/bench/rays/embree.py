@@ -35,10 +35,22 @@ INDICES, UINT3 = 0, 0x5003
 class _Work(Structure):
     """`Work` of embree_loop.c."""
 
-    _fields_ = [("one", c_void_p), ("eight", c_void_p), ("scene", c_void_p), ("arguments", c_void_p),
-                ("origins", c_void_p), ("directions", c_void_p), ("t_max", c_void_p), ("t", c_void_p),
-                ("primitive", c_void_p), ("count", c_size_t), ("next", c_size_t),
-                ("life", c_longlong), ("inside", c_longlong), ("processor", c_longlong)]
+    _fields_ = [
+        ("one", c_void_p),
+        ("eight", c_void_p),
+        ("scene", c_void_p),
+        ("arguments", c_void_p),
+        ("origins", c_void_p),
+        ("directions", c_void_p),
+        ("t_max", c_void_p),
+        ("t", c_void_p),
+        ("primitive", c_void_p),
+        ("count", c_size_t),
+        ("next", c_size_t),
+        ("life", c_longlong),
+        ("inside", c_longlong),
+        ("processor", c_longlong),
+    ]
 
 
 class _Arguments(Structure):
@@ -108,16 +120,23 @@ class EmbreeRays:
     (`any_hit`): t = −inf for a hit.
     """
 
-    def __init__(self, scene: EmbreeScene, rays: Rays, *, any_hit: bool, width: int = 1,
-                 coherent: bool = False) -> None:
+    def __init__(
+        self, scene: EmbreeScene, rays: Rays, *, any_hit: bool, width: int = 1, coherent: bool = False
+    ) -> None:
         self._scene = scene
         self._inputs = [np.ascontiguousarray(array, np.float32) for array in rays]
         self.t, self.primitive = np.zeros(len(rays[2]), np.float32), np.zeros(len(rays[2]), np.int32)
-        self._arguments = _Arguments(COHERENT if coherent else 0, 0xffffffff)
+        self._arguments = _Arguments(COHERENT if coherent else 0, 0xFFFFFFFF)
         function = scene.function(f"rtc{'Occluded' if any_hit else 'Intersect'}{width}")
         arrays = [array.ctypes.data for array in [*self._inputs, self.t, self.primitive]]
-        self._work = _Work(function if width == 1 else None, function if width == 8 else None, scene.handle,
-                           ctypes.addressof(self._arguments), *arrays, len(self.t))
+        self._work = _Work(
+            function if width == 1 else None,
+            function if width == 8 else None,
+            scene.handle,
+            ctypes.addressof(self._arguments),
+            *arrays,
+            len(self.t),
+        )
 
     def trace(self) -> tuple[float, float]:
         """Trace all rays on all threads. Return seconds and processor seconds, both without the overhead of the loop.

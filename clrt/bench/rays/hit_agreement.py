@@ -57,11 +57,17 @@ class Way(NamedTuple):
 
 def measure_hits(*, quick: bool = False, device: str | int | None = None) -> Iterator[dict[str, Any]]:
     """Yield the results of `clrt bench hits` by mesh: see `measure_case`. device: default all except simulators."""
-    devices = [choose(device)[0].index] if device is not None else [
-        info.index for info, _ in find_devices() if info.usable and info.type != "simulator"]
+    devices = (
+        [choose(device)[0].index]
+        if device is not None
+        else [info.index for info, _ in find_devices() if info.usable and info.type != "simulator"]
+    )
     effort = QUICK if quick else FULL
-    for case in (Case("icosphere", icosphere(effort.subdivisions), True),
-                 Case("bumpy ball", bumpy_ball(effort.subdivisions), True), Case("soup", soup(effort.soup), False)):
+    for case in (
+        Case("icosphere", icosphere(effort.subdivisions), True),
+        Case("bumpy ball", bumpy_ball(effort.subdivisions), True),
+        Case("soup", soup(effort.soup), False),
+    ):
         yield measure_case(case, devices, effort)
 
 
@@ -82,7 +88,7 @@ def measure_case(case: Case, devices: list[int], effort: Effort) -> dict[str, An
         try:
             hits, blocked = _answers(case.mesh, way, every(step, rays))
         except UsageError:
-            continue    # not every builder supports every layout
+            continue  # not every builder supports every layout
         except ClrtError as error:
             ways.append({**way._asdict(), "error": str(error)})
             continue
@@ -93,9 +99,11 @@ def measure_case(case: Case, devices: list[int], effort: Effort) -> dict[str, An
     result = {"mesh": case.name, "triangles": triangles, "kinds": list(kinds), "rays": len(names), "ways": ways}
     if first is not None:
         inside = np.isin(names, [list(kinds).index(kind) for kind in ("vertices", "edges")])
-        result |= {"exact": _checked(case.mesh, rays, first, -(-len(names) * triangles // effort.exact_tests)),
-                   "escaped": int(np.sum(inside & (first["primitive"] < 0))) if case.closed else None,
-                   "flat": int(np.sum(_on_flat(case.mesh, first)))}
+        result |= {
+            "exact": _checked(case.mesh, rays, first, -(-len(names) * triangles // effort.exact_tests)),
+            "escaped": int(np.sum(inside & (first["primitive"] < 0))) if case.closed else None,
+            "flat": int(np.sum(_on_flat(case.mesh, first))),
+        }
     return result
 
 
@@ -117,8 +125,11 @@ def _checked(mesh: Mesh, rays: Rays, hits: NDArray[Any], step: int) -> dict[str,
     """Check every step-th ray. Hits on zero-area triangles, which float64 never reports, are counted separately."""
     some, found = every(step, rays), hits[::step]
     bounds = closest_bounds(*mesh, some)
-    return {"rays": len(bounds.low), "decided": int(np.sum(bounds.primitive != UNDECIDED)),
-            "wrong": int(np.sum(bounds.wrong(some, found) & ~_on_flat(mesh, found)))}
+    return {
+        "rays": len(bounds.low),
+        "decided": int(np.sum(bounds.primitive != UNDECIDED)),
+        "wrong": int(np.sum(bounds.wrong(some, found) & ~_on_flat(mesh, found))),
+    }
 
 
 def _on_flat(mesh: Mesh, hits: NDArray[Any]) -> NDArray[np.bool_]:

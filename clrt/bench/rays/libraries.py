@@ -32,6 +32,7 @@ class Library(NamedTuple):
 
 def clrt(query: RayQuery) -> Call:
     """Wrap an existing query of clrt."""
+
     def call(origins: Floats, directions: Floats) -> Answer:
         hits = query.closest_hit(origins, directions)
         return hits["primitive"], hits["t"]
@@ -89,11 +90,17 @@ def warp(vertices: Floats, faces: Faces) -> Call:
 
     vectors = library.array(dtype=vector)
     closest_hit.__annotations__ = {
-        "mesh": library.uint64, "origins": vectors, "directions": vectors,
-        "primitives": library.array(dtype=library.int32), "ts": library.array(dtype=library.float32)}
+        "mesh": library.uint64,
+        "origins": vectors,
+        "directions": vectors,
+        "primitives": library.array(dtype=library.int32),
+        "ts": library.array(dtype=library.float32),
+    }
     kernel = library.kernel(closest_hit)
-    mesh = library.Mesh(library.array(vertices, dtype=vector, device=device),
-                        library.array(faces.ravel(), dtype=library.int32, device=device))
+    mesh = library.Mesh(
+        library.array(vertices, dtype=vector, device=device),
+        library.array(faces.ravel(), dtype=library.int32, device=device),
+    )
 
     def call(origins: Floats, directions: Floats) -> Answer:
         inputs = [library.array(array, dtype=vector, device=device) for array in (origins, directions)]

@@ -23,17 +23,23 @@ from .ray_speed import Floats, Run
 from .workloads import Faces, Mesh, Workload, closed_room, rotated_copies, subdivide, workloads
 
 #: Embree configurations: robust scene, packet width, coherent flag.
-EMBREE = {"embree 1": (False, 1, False), "embree 8": (False, 8, False), "embree 8 coherent": (False, 8, True),
-          "embree 1 robust": (True, 1, False), "embree 8 robust": (True, 8, False),
-          "embree 8 robust coherent": (True, 8, True)}
+EMBREE = {
+    "embree 1": (False, 1, False),
+    "embree 8": (False, 8, False),
+    "embree 8 coherent": (False, 8, True),
+    "embree 1 robust": (True, 1, False),
+    "embree 8 robust": (True, 8, False),
+    "embree 8 robust coherent": (True, 8, True),
+}
 SIZE, QUICK_SIZE = (800, 800), (256, 256)
 LARGE, COPIES = 1_000_000, 20
 #: Relative to the largest t: hits agree if their t differ by less.
 TOLERANCE = 1e-5
 
 
-def measure_peers(vertices: Floats, faces: Faces, *, quick: bool = False,
-                  device: str | int | None = None) -> Iterator[dict[str, Any]]:
+def measure_peers(
+    vertices: Floats, faces: Faces, *, quick: bool = False, device: str | int | None = None
+) -> Iterator[dict[str, Any]]:
     """Yield the results of `clrt bench peers`, scene by scene. vertices: (n, 3); faces: (m, 3).
 
     trees: build seconds and bytes of each BVH; hits: the fraction of each kind of rays that hit; kernels, and in the
@@ -42,11 +48,17 @@ def measure_peers(vertices: Floats, faces: Faces, *, quick: bool = False,
     for name, scene, target in _scenes(vertices, faces, quick):
         query = RayQuery(*scene, device=device)
         kinds = list(workloads(*scene, target, query.closest_hit, QUICK_SIZE if quick else SIZE))
-        result = {"scene": name, "triangles": len(scene[1]), "device": query.device.info.name,
-                  "platform": query.device.info.platform, "device_type": query.device.info.type,
-                  "layout": query.tree.name, "sah_cost": query.tree.sah_cost,
-                  "hits": {kind.name: float(np.mean(query.any_hit(*kind.rays))) for kind in kinds},
-                  **_measure_kernels(scene, query, kinds)}
+        result = {
+            "scene": name,
+            "triangles": len(scene[1]),
+            "device": query.device.info.name,
+            "platform": query.device.info.platform,
+            "device_type": query.device.info.type,
+            "layout": query.tree.name,
+            "sah_cost": query.tree.sah_cost,
+            "hits": {kind.name: float(np.mean(query.any_hit(*kind.rays))) for kind in kinds},
+            **_measure_kernels(scene, query, kinds),
+        }
         if name == "room":
             calls, missing = _measure_calls(scene, query, kinds)
             result |= {"calls": calls, "missing": result["missing"] | missing}

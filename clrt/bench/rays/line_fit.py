@@ -15,5 +15,8 @@ def fit_logarithm(sizes: ArrayLike, values: ArrayLike) -> dict[str, float]:
     from_mean, deviations = x - x.mean(), y - y.mean()
     b = from_mean @ deviations / (from_mean @ from_mean)
     residuals, variance = deviations - b * from_mean, deviations @ deviations
-    return {"a": float(y.mean() - b * x.mean()), "b": float(b),
-            "r2": float(1 - residuals @ residuals / variance) if variance > 0 else 1.0}
+    return {
+        "a": float(y.mean() - b * x.mean()),
+        "b": float(b),
+        "r2": float(1 - residuals @ residuals / variance) if variance > 0 else 1.0,
+    }

@@ -37,7 +37,7 @@ def seen_both_ways(device: Device, scene: Scene, sample: int = 0, **chosen: Any)
     program = build(device, compiled.source_of("bench/raster_hits.cl", typedefs({"Seen": SEEN})))
     kernel = make_kernel(device, program, "raster_hits")
     seen = [empty_array(device, SEEN, width * height) for _ in range(2)]
-    given = [*(each.buffer for each in seen), on_device(device, tiles), launch[0]]   # kernels keep no references
+    given = [*(each.buffer for each in seen), on_device(device, tiles), launch[0]]  # kernels keep no references
     bins = RasterBins(device, compiled, arguments)
     kernel.set_args(*arguments, *given, *bins.of(launch, {}))
     run_kernel(device, kernel, -(-len(tiles) * TILE_PIXELS // (compiled.choices.lanes * device.local_size)))

@@ -39,8 +39,9 @@ class Run:
         return self._query.kernel_seconds - kernel, _others() - others
 
 
-def measure_rays(vertices: Floats, faces: NDArray[np.int32], rays: Rays, *, repeats: int = 7,
-                 **options: Any) -> dict[str, Any]:
+def measure_rays(
+    vertices: Floats, faces: NDArray[np.int32], rays: Rays, *, repeats: int = 7, **options: Any
+) -> dict[str, Any]:
     """Return the results of `clrt bench rays` with rays from a file: medians of `repeats` calls after a warm-up call.
 
     vertices: (n, 3); faces: (m, 3); rays: origins (k, 3), directions (k, 3), t_max (k,). options: see RayQuery.
@@ -51,13 +52,22 @@ def measure_rays(vertices: Floats, faces: NDArray[np.int32], rays: Rays, *, repe
     closest, any_ = Run(query, query.closest_hit, rays), Run(query, query.any_hit, rays)
     kernels = [median(run()[0] for _ in range(repeats)) for run in (closest, any_)]
     count = len(rays[2]) / 1e6
-    return {"device": query.device.info.name, "platform": query.device.info.platform, "layout": query.tree.name,
-            "triangles": len(faces), "rays": len(rays[2]),
-            "build_seconds": build_seconds, "tree_seconds": query.tree.build_seconds, "sah_cost": query.tree.sah_cost,
-            "bytes_per_triangle": query.tree.bytes / max(1, len(faces)),
-            "mrays_closest": count / kernels[0], "mrays_any": count / kernels[1],
-            "mrays_closest_call": count / median(closest.calls), "mrays_any_call": count / median(any_.calls),
-            "hits": int(np.count_nonzero(closest.answers["primitive"] >= 0))}
+    return {
+        "device": query.device.info.name,
+        "platform": query.device.info.platform,
+        "layout": query.tree.name,
+        "triangles": len(faces),
+        "rays": len(rays[2]),
+        "build_seconds": build_seconds,
+        "tree_seconds": query.tree.build_seconds,
+        "sah_cost": query.tree.sah_cost,
+        "bytes_per_triangle": query.tree.bytes / max(1, len(faces)),
+        "mrays_closest": count / kernels[0],
+        "mrays_any": count / kernels[1],
+        "mrays_closest_call": count / median(closest.calls),
+        "mrays_any_call": count / median(any_.calls),
+        "hits": int(np.count_nonzero(closest.answers["primitive"] >= 0)),
+    }
 
 
 def load_rays(path: Path) -> Rays:
@@ -101,8 +111,11 @@ def scattered_rays(vertices: Floats, count: int = 1 << 20, seed: int = 0) -> Ray
     directions = rng.normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     back = np.where(np.arange(count) % 2, np.linalg.norm(high - low), 0.0)[:, None]
-    return ((inside - back * directions).astype(np.float32), directions.astype(np.float32),
-            np.full(count, np.inf, np.float32))
+    return (
+        (inside - back * directions).astype(np.float32),
+        directions.astype(np.float32),
+        np.full(count, np.inf, np.float32),
+    )
 
 
 def every(step: int, rays: Rays) -> Rays:

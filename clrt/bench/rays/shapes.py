@@ -38,5 +38,5 @@ def soup(count: int, seed: int = 0) -> Mesh:
     faces = np.arange(3 * count).reshape(count, 3)
     faces[10::20, 2] = faces[10::20, 0]
     copies = count // 24
-    faces[count - 3 * copies:] = np.tile(faces[:copies], (3, 1))
+    faces[count - 3 * copies :] = np.tile(faces[:copies], (3, 1))
     return corners.reshape(-1, 3).astype(np.float32), rng.permutation(faces).astype(np.int32)

@@ -57,8 +57,10 @@ def subdivide(vertices: Floats, faces: Faces) -> Mesh:
     middles = (vertices[keys // len(vertices)] + vertices[keys % len(vertices)]) / 2
     (a, b, c), (ab, bc, ca) = faces.T, (len(vertices) + middle.reshape(-1, 3).astype(np.int32)).T
     corners = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return (np.concatenate([vertices, middles.astype(np.float32)]),
-            np.concatenate([np.stack(triangle, axis=1) for triangle in corners]))
+    return (
+        np.concatenate([vertices, middles.astype(np.float32)]),
+        np.concatenate([np.stack(triangle, axis=1) for triangle in corners]),
+    )
 
 
 def rotated_copies(vertices: Floats, faces: Faces, count: int, seed: int = 0) -> Mesh:
@@ -66,12 +68,13 @@ def rotated_copies(vertices: Floats, faces: Faces, count: int, seed: int = 0) ->
     rng = np.random.default_rng(seed)
     center, extent = _frame(vertices)
     side = int(np.ceil(count ** (1 / 3)))
-    cells = np.stack(np.unravel_index(rng.permutation(side ** 3)[:count], (side,) * 3), axis=1)
+    cells = np.stack(np.unravel_index(rng.permutation(side**3)[:count], (side,) * 3), axis=1)
     return joined([((vertices - center) @ _rotation(rng).T + 1.2 * extent * cell, faces) for cell in cells])
 
 
-def workloads(vertices: Floats, faces: Faces, target: Floats, trace: Tracer, size: tuple[int, int],
-              seed: int = 0) -> Iterator[Workload]:
+def workloads(
+    vertices: Floats, faces: Faces, target: Floats, trace: Tracer, size: tuple[int, int], seed: int = 0
+) -> Iterator[Workload]:
     """Yield rays. primary: from a camera; bounce: on from its hits; shadow, occluded: from its hits to a light.
 
     The light of `occluded` is at the center of the target, which occludes it from most sides. target: the vertices (n,
@@ -96,8 +99,11 @@ def camera_rays(position: Doubles, look_at: Doubles, size: tuple[int, int]) -> R
     y, x = np.mgrid[:height, :width].reshape(2, -1, 1) + 0.5
     half = np.tan(np.radians(FOV_DEGREES) / 2)
     directions = _unit(forward + half * ((2 * x - width) / height * right + (1 - 2 * y / height) * up))
-    return (np.broadcast_to(position.astype(np.float32), directions.shape).copy(), directions.astype(np.float32),
-            np.full(len(directions), np.inf, np.float32))
+    return (
+        np.broadcast_to(position.astype(np.float32), directions.shape).copy(),
+        directions.astype(np.float32),
+        np.full(len(directions), np.inf, np.float32),
+    )
 
 
 def surface_points(vertices: Floats, faces: Faces, rays: Rays, hits: NDArray[Any]) -> tuple[Doubles, Doubles]:
@@ -146,16 +152,22 @@ def _box(center: Doubles, half: float) -> Mesh:
 def joined(meshes: list[tuple[NDArray[Any], Faces]]) -> Mesh:
     """Join all meshes into one."""
     first = np.cumsum([0] + [len(vertices) for vertices, _ in meshes]).astype(np.int32)
-    return (np.concatenate([vertices for vertices, _ in meshes]).astype(np.float32),
-            np.concatenate([faces + start for (_, faces), start in zip(meshes, first)]))
+    return (
+        np.concatenate([vertices for vertices, _ in meshes]).astype(np.float32),
+        np.concatenate([faces + start for (_, faces), start in zip(meshes, first)]),
+    )
 
 
 def _rotation(rng: np.random.Generator) -> Doubles:
     """Return a uniformly distributed rotation from a normal quaternion (Shoemake, Uniform random rotations, 1992)."""
     w, x, y, z = _unit(rng.normal(size=4))
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _unit(vectors: Doubles) -> Doubles:

@@ -49,7 +49,7 @@ def means_of(renderer: Contestant, spp: int, seeds: Sequence[int], block: int = 
 def block_means(pixels: Doubles, block: int) -> Doubles:
     """Reduce (h, w, 3) to (rows, columns, 3); pixels left over at the lower and right edges are ignored."""
     rows, columns = (size // block for size in pixels.shape[:2])
-    whole = pixels[:rows * block, :columns * block]
+    whole = pixels[: rows * block, : columns * block]
     return np.asarray(whole.reshape(rows, block, columns, block, 3).mean((1, 3)))
 
 
@@ -65,10 +65,16 @@ def compared(ours: Means, theirs: Means) -> dict[str, Any]:
     t, freedom, difference, noise = _welch(ours.blocks, theirs.blocks)
     p = np.array([corrected(t_test(*each), t.size) for each in zip(t.ravel().tolist(), freedom.ravel().tolist())])
     rejected = int(np.count_nonzero(p < FAMILY))
-    return {"mean_ratio": ratio.tolist(), "mean_error": error.tolist(), "blocks": t.size // 3,
-            "noise": [float(np.median(noise)), float(noise.max())], "difference": float(np.abs(difference).max()),
-            "p": float(p.min()), "rejected": rejected,
-            "agree": bool(np.all(np.abs(ratio - 1) < MEAN)) and not rejected and all(map(isfinite, ratio))}
+    return {
+        "mean_ratio": ratio.tolist(),
+        "mean_error": error.tolist(),
+        "blocks": t.size // 3,
+        "noise": [float(np.median(noise)), float(noise.max())],
+        "difference": float(np.abs(difference).max()),
+        "p": float(p.min()),
+        "rejected": rejected,
+        "agree": bool(np.all(np.abs(ratio - 1) < MEAN)) and not rejected and all(map(isfinite, ratio)),
+    }
 
 
 def mean_ratio(ours: Doubles, theirs: Doubles) -> tuple[Doubles, Doubles]:
@@ -106,6 +112,7 @@ def agreement(scene: Scene, spp: int, seeds: int, device: str | int | None = Non
         raise UsageError(f"images of {width}x{height} pixels have no block of {BLOCK}x{BLOCK}; use a larger --size")
     try:
         from .mitsuba_renderer import contestants
+
         # The first, with independent samples: images of multijitter share permutations between seeds, so that the
         # spread over seeds underestimates their error (docs/measurements/mitsuba.md).
         theirs = next(iter(contestants(scene).values()))

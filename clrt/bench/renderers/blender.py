@@ -31,8 +31,9 @@ class Judged(NamedTuple):
     images: dict[str, FloatArray]
 
 
-def judge(scenes: Collection[str], materials: Collection[str], spp: int, seeds: int,
-          device: str | int | None = None) -> Iterator[Judged]:
+def judge(
+    scenes: Collection[str], materials: Collection[str], spp: int, seeds: int, device: str | int | None = None
+) -> Iterator[Judged]:
     """Compare each of `scenes` with each of `materials` (empty: all), rendered by both with seeds 1 to `seeds` (>= 2).
 
     Raises UsageError for names that are not in SCENES or MATERIALS, and if Blender is not installed.
@@ -45,8 +46,11 @@ def judge(scenes: Collection[str], materials: Collection[str], spp: int, seeds: 
     except ImportError:
         raise UsageError("Blender is not installed; run pip install bpy, with Python 3.11") from None
     number = choose(device)[0].index
-    return (_judged(library, scene, material, spp, range(1, seeds + 1), number)
-            for scene in scenes or SCENES for material in materials or MATERIALS)
+    return (
+        _judged(library, scene, material, spp, range(1, seeds + 1), number)
+        for scene in scenes or SCENES
+        for material in materials or MATERIALS
+    )
 
 
 def _judged(library: Any, scene: str, material: str, spp: int, seeds: range, device: int) -> Judged:
@@ -68,13 +72,16 @@ def _rendered(scene: Scene, spp: int, seed: int, device: int) -> tuple[NDArray[n
     return state.pixels, renderer.aovs(state)["object"]
 
 
-def compared(ours: FloatArray, theirs: FloatArray,
-             regions: Mapping[str, NDArray[np.bool_]]) -> tuple[dict[str, float], dict[str, float]]:
+def compared(
+    ours: FloatArray, theirs: FloatArray, regions: Mapping[str, NDArray[np.bool_]]
+) -> tuple[dict[str, float], dict[str, float]]:
     """Return the ratios of means over the pixels (h, w) of each region and all channels, and their standard errors.
 
     ours, theirs: images (seeds, h, w, 3).
     """
-    means = [np.column_stack([images[:, where].mean((1, 2), dtype=np.float64) for where in regions.values()])
-             for images in (ours, theirs)]
+    means = [
+        np.column_stack([images[:, where].mean((1, 2), dtype=np.float64) for where in regions.values()])
+        for images in (ours, theirs)
+    ]
     ratios, errors = mean_ratio(*means)
     return dict(zip(regions, ratios.tolist())), dict(zip(regions, errors.tolist()))

@@ -36,7 +36,8 @@ SHAPES: dict[str, tuple[str, dict[str, Any], Vector, float, float]] = {
     "floor": ("create_grid", {"size": 5.0}, (0.0, 0.0, 0.0), 1.0, 0.0),
     "Suzanne": ("create_monkey", {}, (-1.4, 0.0, 0.6), 0.6, -20.0),
     "ball": ("create_uvsphere", {"u_segments": 64, "v_segments": 32, "radius": 0.6}, (0.1, -0.2, 0.6), 1.0, 0.0),
-    "cube": ("create_cube", {"size": 1.0}, (1.5, 0.2, 0.5), 1.0, 35.0)}
+    "cube": ("create_cube", {"size": 1.0}, (1.5, 0.2, 0.5), 1.0, 35.0),
+}
 #: Base colors; the floor has the texture `checks`.
 COLORS = {"floor": None, "Suzanne": (0.7, 0.35, 0.2), "ball": (0.3, 0.6, 0.7), "cube": (0.5, 0.5, 0.2)}
 Inputs = dict[str | int, Any]
@@ -48,9 +49,13 @@ GLASS: Inputs = {"Base Color": (1.0, 1.0, 1.0, 1.0), "Roughness": 0.0, "Transmis
 BUMPS: Inputs = {**MATTE, "Normal": None}
 #: The inputs of Principled BSDFs, by material and object; other objects are matte.
 MATERIALS: dict[str, dict[str, Inputs]] = {
-    "matte": {}, "bumps": {"cube": BUMPS}, "metal": {"ball": METAL}, "glass": {"ball": GLASS},
+    "matte": {},
+    "bumps": {"cube": BUMPS},
+    "metal": {"ball": METAL},
+    "glass": {"ball": GLASS},
     "plastic": dict.fromkeys(COLORS, PLASTIC),
-    "all": {"floor": PLASTIC, "Suzanne": METAL, "ball": GLASS, "cube": BUMPS}}
+    "all": {"floor": PLASTIC, "Suzanne": METAL, "ball": GLASS, "cube": BUMPS},
+}
 
 
 def build(library: Any, scene: str, material: str, folder: Path) -> Any:
@@ -72,17 +77,30 @@ def exported(library: Any, made: Any, folder: Path) -> Scene:
     """Return the scene read from its glTF export, plus what glTF lacks: sun size, area lights, environment."""
     file = folder / "scene.glb"
     with quiet():
-        library.ops.export_scene.gltf(filepath=str(file), export_apply=True, export_cameras=True, export_lights=True,
-                                      export_import_convert_lighting_mode="COMPAT")
+        library.ops.export_scene.gltf(
+            filepath=str(file),
+            export_apply=True,
+            export_cameras=True,
+            export_lights=True,
+            export_import_convert_lighting_mode="COMPAT",
+        )
     model = read_model(file)
     areas = [emissive_square(each) for each in made.objects if each.type == "LIGHT" and each.data.type == "AREA"]
     angle = sum(degrees(each.data.angle) for each in made.objects if each.type == "LIGHT" and each.data.type == "SUN")
-    lights = [replace(each, angle_degrees=angle) if isinstance(each, DirectionalLight) else each
-              for each in model.lights]
+    lights = [
+        replace(each, angle_degrees=angle) if isinstance(each, DirectionalLight) else each for each in model.lights
+    ]
     sky = Environment(image=low_sun(), rotation_degrees=ROTATION) if made.world else Environment()
     [camera] = model.cameras.values()
-    return Scene(meshes=[*model.meshes, *areas], instances=model.instances, lights=lights, environment=sky,
-                 camera=camera, render=SETTINGS, name=file.stem)
+    return Scene(
+        meshes=[*model.meshes, *areas],
+        instances=model.instances,
+        lights=lights,
+        environment=sky,
+        camera=camera,
+        render=SETTINGS,
+        name=file.stem,
+    )
 
 
 def emissive_square(light: Any) -> Mesh:
@@ -118,8 +136,15 @@ def _point(data: Any, made: Any, folder: Path) -> None:
 
 def _emission(data: Any, made: Any, folder: Path) -> None:
     nodes, material = _nodes(data, "emission")
-    _principled(nodes, {**MATTE, "Base Color": (0.0, 0.0, 0.0, 1.0), "Emission Color": (1.0, 1.0, 1.0, 1.0),
-                        "Emission Strength": 40.0})
+    _principled(
+        nodes,
+        {
+            **MATTE,
+            "Base Color": (0.0, 0.0, 0.0, 1.0),
+            "Emission Color": (1.0, 1.0, 1.0, 1.0),
+            "Emission Strength": 40.0,
+        },
+    )
     _aimed(place(data, made, _mesh(data, "emission", material, "create_grid", size=SIDE / 2)), (2.5, 0.0, 3.5))
 
 
@@ -128,11 +153,18 @@ def _hdri(data: Any, made: Any, folder: Path) -> None:
 
 
 LIGHTS: dict[str, Callable[[Any, Any, Path], None]] = {
-    "spot": _spot, "area": _area, "sun": _sun, "delta_sun": _delta_sun, "point": _point, "emission": _emission,
-    "HDRI": _hdri}
+    "spot": _spot,
+    "area": _area,
+    "sun": _sun,
+    "delta_sun": _delta_sun,
+    "point": _point,
+    "emission": _emission,
+    "HDRI": _hdri,
+}
 #: The lights of each scene.
 SCENES: dict[str, tuple[str, ...]] = {name: (name,) for name in LIGHTS} | {
-    "together": tuple(name for name in LIGHTS if name != "delta_sun")}
+    "together": tuple(name for name in LIGHTS if name != "delta_sun")
+}
 
 
 def _add_light(data: Any, made: Any, kind: str, energy: float, position: Vector) -> Any:

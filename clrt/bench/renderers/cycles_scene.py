@@ -40,8 +40,10 @@ def check_scene(scene: Scene) -> None:
         if type(owner.material) not in BSDFS:
             raise UsageError(f"{owner.name}: {owner.material.kernel} is not exported to Cycles yet")
         if isinstance(owner.material, MetallicRoughness) and not _is_metal(owner.material):
-            raise UsageError(f"{owner.name}: Cycles supports metallic_roughness that is fully metallic, with single "
-                             'scattering and smith = "height_correlated"')
+            raise UsageError(
+                f"{owner.name}: Cycles supports metallic_roughness that is fully metallic, with single "
+                'scattering and smith = "height_correlated"'
+            )
         if isinstance(owner.material, Dielectric) and owner.material.features() != {"TRANSMISSION"}:
             raise UsageError(f"{owner.name}: Cycles supports dielectric that is smooth, not thin, and absorbs nothing")
     exported_lights(scene)
@@ -118,8 +120,12 @@ def _mirror(nodes: Nodes, material: Mirror) -> Any:
 
 def _metal(nodes: Nodes, material: MetallicRoughness) -> Any:
     """Return a metal. The F82 model equals Schlick's if its tint is white; Blender squares roughness, too."""
-    return nodes("BsdfMetallic", {"Base Color": (*material.lobes.f0, 1), "Edge Tint": (1, 1, 1, 1),
-                                  "Roughness": material.roughness}, fresnel_type="F82", distribution="GGX")
+    return nodes(
+        "BsdfMetallic",
+        {"Base Color": (*material.lobes.f0, 1), "Edge Tint": (1, 1, 1, 1), "Roughness": material.roughness},
+        fresnel_type="F82",
+        distribution="GGX",
+    )
 
 
 def _dielectric(nodes: Nodes, material: Dielectric) -> Any:
@@ -133,12 +139,19 @@ def _dielectric(nodes: Nodes, material: Dielectric) -> Any:
 
 Bsdf = Callable[[Nodes, Any], Any]
 BSDFS: dict[type[Material], Bsdf] = {
-    Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metal, Dielectric: _dielectric}
+    Diffuse: _diffuse,
+    Mirror: _mirror,
+    MetallicRoughness: _metal,
+    Dielectric: _dielectric,
+}
 
 
 def _is_metal(material: MetallicRoughness) -> bool:
-    return (not np.any(material.lobes.albedo) and material.smith == "height_correlated"
-            and not material.features() & {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"})
+    return (
+        not np.any(material.lobes.albedo)
+        and material.smith == "height_correlated"
+        and not material.features() & {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"}
+    )
 
 
 def _material(data: Any, material: Material, bsdfs: Mapping[type[Material], Bsdf]) -> Any:
@@ -157,8 +170,7 @@ def _material(data: Any, material: Material, bsdfs: Mapping[type[Material], Bsdf
     return made
 
 
-def _mesh(data: Any, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any] | None,
-          material: Any) -> Any:
+def _mesh(data: Any, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any] | None, material: Any) -> Any:
     made = data.meshes.new("mesh")
     made.from_pydata(turned(vertices).tolist(), [], faces.tolist())
     made.materials.append(material)
@@ -187,8 +199,9 @@ def exported_lights(scene: Scene) -> list[Exported]:
             case PointLight(range=None) | DirectionalLight():
                 found.append(light)
             case PointLight() | SpotLight():
-                raise UsageError(f"{scene.name}: ranges and spot lights fall off differently in Cycles and are not "
-                                 "exported")
+                raise UsageError(
+                    f"{scene.name}: ranges and spot lights fall off differently in Cycles and are not exported"
+                )
             case _:
                 assert_never(light)
     return found

@@ -59,8 +59,10 @@ def scenarios(folder: Path) -> list[Scenario]:
         entries = json.loads(config.read_text(encoding="utf-8"))["scenarios"]
         found = [_scenario(folder, entry) for entry in entries]
     except FileNotFoundError:
-        raise UsageError(f"{config}: is missing; clone KhronosGroup/glTF-Render-Fidelity with --recurse-submodules "
-                         f"and name its folder") from None
+        raise UsageError(
+            f"{config}: is missing; clone KhronosGroup/glTF-Render-Fidelity with --recurse-submodules "
+            f"and name its folder"
+        ) from None
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise UsageError(f"{config}: is not a list of scenarios ({error!r}); fetch it again") from None
     found = [scenario for scenario in found if scenario.goldens]
@@ -74,12 +76,24 @@ def _scenario(folder: Path, entry: dict[str, Any]) -> Scenario:
     generator, name = folder / GENERATOR, entry["name"]
     size = SIZE | entry.get("dimensions", {})
     golden = {"": generator / "test" / "goldens" / name, ".thumb": folder / "public" / "thumbnails" / "goldens" / name}
-    goldens = {renderer: path for renderer in PATH_TRACERS for part, place in golden.items()
-               for path in [place / f"{renderer}-golden{part}{'.webp' if part else '.png'}"] if path.is_file()}
-    return Scenario(name, generator / _inside(entry["model"]), generator / _inside(entry.get("lighting", LIGHTING)),
-                    orbit_camera(TARGET | entry.get("target", {}), ORBIT | entry.get("orbit", {}),
-                                 float(entry.get("verticalFoV", FOV))),
-                    (int(size["width"]), int(size["height"])), bool(entry.get("renderSkybox", False)), goldens)
+    goldens = {
+        renderer: path
+        for renderer in PATH_TRACERS
+        for part, place in golden.items()
+        for path in [place / f"{renderer}-golden{part}{'.webp' if part else '.png'}"]
+        if path.is_file()
+    }
+    return Scenario(
+        name,
+        generator / _inside(entry["model"]),
+        generator / _inside(entry.get("lighting", LIGHTING)),
+        orbit_camera(
+            TARGET | entry.get("target", {}), ORBIT | entry.get("orbit", {}), float(entry.get("verticalFoV", FOV))
+        ),
+        (int(size["width"]), int(size["height"])),
+        bool(entry.get("renderSkybox", False)),
+        goldens,
+    )
 
 
 def files_of(model: Path) -> list[Path]:
@@ -88,7 +102,7 @@ def files_of(model: Path) -> list[Path]:
         document = json.loads(model.read_text(encoding="utf-8")) if model.suffix == ".gltf" else {}
         named = [one.get("uri", "data:") for part in ("buffers", "images") for one in document.get(part, [])]
     except (OSError, ValueError, AttributeError):
-        named = []    # reported when the model is read
+        named = []  # reported when the model is read
     return [model, *(model.parent / unquote(uri) for uri in named if not uri.startswith("data:"))]
 
 
@@ -125,8 +139,9 @@ def golden(renderer: str, path: Path, size: tuple[int, int]) -> tuple[Floats, Fl
 def shrunk(rgba: Floats, size: tuple[int, int]) -> Floats:
     """Reduce encoded colors and alpha, (h, w, 4) in [0, 1], as the website does: colors are weighted by alpha. So text,
     highlights and edges smaller than a pixel have the same weight as in the images reduced there."""
-    premultiplied = rgba * np.concatenate([np.broadcast_to(rgba[..., 3:], (*rgba.shape[:2], 3)), np.ones_like(
-        rgba[..., 3:])], axis=2)
+    premultiplied = rgba * np.concatenate(
+        [np.broadcast_to(rgba[..., 3:], (*rgba.shape[:2], 3)), np.ones_like(rgba[..., 3:])], axis=2
+    )
     pixels = np.clip(lanczos(premultiplied, size), 0, 1)
     pixels[..., :3] = np.minimum(pixels[..., :3] / np.maximum(pixels[..., 3:], 1 / 255), 1)
     return pixels
@@ -135,6 +150,7 @@ def shrunk(rgba: Floats, size: tuple[int, int]) -> Floats:
 def compressed(rgba: Floats) -> Floats:
     """Return the image after the website's compression."""
     import imageio.v3 as imageio
+
     stored = imageio.imwrite("<bytes>", np.rint(rgba * 255).astype(np.uint8), extension=".webp", quality=QUALITY)
     return np.asarray(imageio.imread(stored, extension=".webp", mode="RGBA") / 255, np.float32)
 
@@ -142,7 +158,7 @@ def compressed(rgba: Floats) -> Floats:
 def over_white(rgba: Floats, power: float | None = None) -> tuple[Floats, Floats]:
     """Return the display's linear light over white, (h, w, 3), and alpha, (h, w). power: None for the sRGB curve."""
     colors, alpha = rgba[..., :3], rgba[..., 3:]
-    decoded = linear_from_srgb(colors) if power is None else colors ** power
+    decoded = linear_from_srgb(colors) if power is None else colors**power
     return np.asarray(decoded * alpha + 1 - alpha, np.float32), alpha[..., 0]
 
 
@@ -158,8 +174,10 @@ def lanczos(pixels: Floats, size: tuple[int, int]) -> Floats:
 
 def _resampled(pixels: Floats, size: tuple[int, int], weights: Callable[[int, int], Floats]) -> Floats:
     width, height = size
-    return np.ascontiguousarray(weights(pixels.shape[1], width) @ (
-        weights(pixels.shape[0], height) @ pixels.transpose(2, 0, 1)).transpose(0, 2, 1)).transpose(2, 1, 0)
+    return np.ascontiguousarray(
+        weights(pixels.shape[1], width)
+        @ (weights(pixels.shape[0], height) @ pixels.transpose(2, 0, 1)).transpose(0, 2, 1)
+    ).transpose(2, 1, 0)
 
 
 def _averages(n: int, m: int) -> Floats:

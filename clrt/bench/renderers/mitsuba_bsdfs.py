@@ -57,8 +57,13 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
             # normals.
             if plugin["type"] == "gltf":
                 plugin |= {"bumps": True}
-            plugin = {"type": "normalmap", "normalmap": _bend(material.normal_map), "bsdf": plugin,
-                      "use_shadowing_function": isinstance(material, Diffuse), "flip_invalid_normals": False}
+            plugin = {
+                "type": "normalmap",
+                "normalmap": _bend(material.normal_map),
+                "bsdf": plugin,
+                "use_shadowing_function": isinstance(material, Diffuse),
+                "flip_invalid_normals": False,
+            }
         plugin = plugin if "TRANSMISSION" in material.features() else {"type": "twosided", "front": plugin}
         if material.one_sided:
             raise ValueError("one-sided surfaces")
@@ -127,7 +132,7 @@ def finer(texels: Any, wrap: tuple[Wrap, Wrap], times: int) -> Any:
 
 def _bend(texture: Texture) -> Plugin:
     """Return a linear normal map that includes the factor, in the frame of u and v."""
-    axes = texture.image_axes   # Mitsuba bends along u and v, however to_uv turns the image
+    axes = texture.image_axes  # Mitsuba bends along u and v, however to_uv turns the image
     if np.abs(np.abs(axes) - 0.5).max() < 0.499:
         raise ValueError(f"the normal map {texture.picture.name}, which is not rotated by a multiple of 90 degrees")
     xyz = _channels(texture, "red", "green", "blue")
@@ -140,8 +145,14 @@ def _bitmap(texture: Texture, texels: Any) -> Plugin:
         raise ValueError("a texture with two wrap modes")
     to_picture = np.eye(4)
     to_picture[:2][:, [0, 1, 3]] = texture.to_picture
-    return {"type": "bitmap", "bitmap": np.asarray(texels, np.float32), "raw": True, "to_uv": to_picture,
-            "wrap_mode": texture.wrap[0], "filter_type": "bilinear" if texture.filter == "linear" else "nearest"}
+    return {
+        "type": "bitmap",
+        "bitmap": np.asarray(texels, np.float32),
+        "raw": True,
+        "to_uv": to_picture,
+        "wrap_mode": texture.wrap[0],
+        "filter_type": "bilinear" if texture.filter == "linear" else "nearest",
+    }
 
 
 def _painted(plugin: Plugin, material: Material) -> Plugin:
@@ -163,21 +174,37 @@ def _mirror(material: Mirror) -> Plugin:
 def _metallic_roughness(material: MetallicRoughness) -> Plugin:
     """Return `principled`, exactly GGX, Schlick's Fresnel and separable Smith for pure metals; otherwise `gltf`."""
     values, has = material.parameters(), material.features()
-    if material.smith == "separable" and values["metallic"] == 1 and not material.textures() and not has & {
-            "MULTIPLE_SCATTERING", "LAYERS"}:
+    if (
+        material.smith == "separable"
+        and values["metallic"] == 1
+        and not material.textures()
+        and not has & {"MULTIPLE_SCATTERING", "LAYERS"}
+    ):
         lobes = material.lobes
         return {"type": "principled", "metallic": 1.0, "roughness": sqrt(lobes.alpha), "base_color": rgb(lobes.f0)}
-    plugin = {"type": "gltf", "color": color(values["color"]), "metallic": number(values["metallic"]),
-              "roughness": number(material.roughness), "f0": color(_f0(material)),
-              "specular": number(material.specular), "transmission": number(material.transmission),
-              "clearcoat": number(material.clearcoat), "sheen_color": color(material.sheen_color),
-              "smith": material.smith, "coupling": material.coupled_by, "multiple": "MULTIPLE_SCATTERING" in has,
-              "transmits": "THROUGH" in has, "layered": "LAYER_ENERGY" in has}
+    plugin = {
+        "type": "gltf",
+        "color": color(values["color"]),
+        "metallic": number(values["metallic"]),
+        "roughness": number(material.roughness),
+        "f0": color(_f0(material)),
+        "specular": number(material.specular),
+        "transmission": number(material.transmission),
+        "clearcoat": number(material.clearcoat),
+        "sheen_color": color(material.sheen_color),
+        "smith": material.smith,
+        "coupling": material.coupled_by,
+        "multiple": "MULTIPLE_SCATTERING" in has,
+        "transmits": "THROUGH" in has,
+        "layered": "LAYER_ENERGY" in has,
+    }
     if "LAYER_ENERGY" in has:
         if material.clearcoat != 0 and material.bent_by is not None:
             raise ValueError("a clearcoat with a normal map: its wrapper bends all layers alike")
-        plugin |= {name: number(untextured(getattr(material, name)))
-                   for name in ("roughness", "clearcoat_roughness", "sheen_roughness")}
+        plugin |= {
+            name: number(untextured(getattr(material, name)))
+            for name in ("roughness", "clearcoat_roughness", "sheen_roughness")
+        }
     return plugin
 
 
@@ -191,21 +218,44 @@ def _f0(material: MetallicRoughness) -> Any:
 
 def _phong(material: Phong) -> Plugin:
     shininess = untextured(material.shininess)
-    return {"type": "phong", "color": color(material.color), "specular": color(material.specular),
-            "shininess": shininess, "half_vector": isinstance(material, BlinnPhong)}
+    return {
+        "type": "phong",
+        "color": color(material.color),
+        "specular": color(material.specular),
+        "shininess": shininess,
+        "half_vector": isinstance(material, BlinnPhong),
+    }
 
 
 def _dielectric(material: Dielectric) -> Plugin:
     if material.thin and (material.rough or untextured(material.color) != (1.0, 1.0, 1.0)):
-        return {"type": "sheet", "ior": material.ior, "color": color(material.color),
-                "alpha": _alpha(material.roughness) if material.rough else 0.0, "multiple": material.scatters_again}
-    plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0,
-              "specular_transmittance": color(material.color)}
+        return {
+            "type": "sheet",
+            "ior": material.ior,
+            "color": color(material.color),
+            "alpha": _alpha(material.roughness) if material.rough else 0.0,
+            "multiple": material.scatters_again,
+        }
+    plugin = {
+        "type": "thindielectric" if material.thin else "dielectric",
+        "int_ior": material.ior,
+        "ext_ior": 1.0,
+        "specular_transmittance": color(material.color),
+    }
     if material.is_specular:
         return plugin
     single = _rough(plugin | {"type": "roughdielectric"}, material.roughness)
-    return {"type": "all_bounces", "ior": material.ior, "alpha": _alpha(material.roughness),
-            "color": color(material.color), "bsdf": single} if material.scatters_again else single
+    return (
+        {
+            "type": "all_bounces",
+            "ior": material.ior,
+            "alpha": _alpha(material.roughness),
+            "color": color(material.color),
+            "bsdf": single,
+        }
+        if material.scatters_again
+        else single
+    )
 
 
 def _conductor(material: Conductor) -> Plugin:
@@ -222,9 +272,15 @@ def _rough(plugin: Plugin, roughness: float | Texture) -> Plugin:
 
 
 def _alpha(roughness: float | Texture) -> float:
-    return max(untextured(roughness)**2, ALPHA_MIN)
+    return max(untextured(roughness) ** 2, ALPHA_MIN)
 
 
 BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {
-    Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metallic_roughness, Dielectric: _dielectric,
-    Conductor: _conductor, Phong: _phong, BlinnPhong: _phong}
+    Diffuse: _diffuse,
+    Mirror: _mirror,
+    MetallicRoughness: _metallic_roughness,
+    Dielectric: _dielectric,
+    Conductor: _conductor,
+    Phong: _phong,
+    BlinnPhong: _phong,
+}

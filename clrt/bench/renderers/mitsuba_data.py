@@ -128,10 +128,14 @@ def _shown(read: MitsubaScene, device: int) -> NDArray[np.bool_]:
         solid = Diffuse(color=(white, white, white), opacity=part.material.opacity)
         return replace(part, material=solid)
 
-    mask = replace(scene, meshes=[*map(masked, scene.meshes)], spheres=[*map(masked, scene.spheres)],
-                   render=replace(scene.render, integrator="albedo"))
+    mask = replace(
+        scene,
+        meshes=[*map(masked, scene.meshes)],
+        spheres=[*map(masked, scene.spheres)],
+        render=replace(scene.render, integrator="albedo"),
+    )
     seen = np.pad(choices_on(mask, [device], {"mask": {}})["mask"](MASK_SPP, 0).pixels.max(axis=2) > 0, 1)
-    around = [seen[y:seen.shape[0] - 2 + y, x:seen.shape[1] - 2 + x] for y in range(3) for x in range(3)]
+    around = [seen[y : seen.shape[0] - 2 + y, x : seen.shape[1] - 2 + x] for y in range(3) for x in range(3)]
     return np.asarray(~np.any(around, axis=0))
 
 
@@ -146,9 +150,14 @@ def _rendered(row: dict[str, Any], case: Case, read: MitsubaScene, budget: int, 
     shown = _shown(read, device) if read.missing else np.ones((height, width), np.bool_)
     for array in (pictures, theirs, variance):
         array[..., ~shown, :] = 0
-    row |= {"result": "failed", "differences": read.differences, "size": [width, height], "spp": spp * SEEDS,
-            "missing": list(dict.fromkeys(each for features in read.missing.values() for each in features)),
-            "judged": float(shown.mean())}
+    row |= {
+        "result": "failed",
+        "differences": read.differences,
+        "size": [width, height],
+        "spp": spp * SEEDS,
+        "missing": list(dict.fromkeys(each for features in read.missing.values() for each in features)),
+        "judged": float(shown.mean()),
+    }
     row |= pixel_test(spp * SEEDS, *(_xyz(array[shown]) for array in (pictures.mean(0), theirs, variance)))
     row |= block_test(_xyz(pictures), _xyz(theirs), _xyz(variance))
     row |= {"mean_ratio": _ratio(pictures.mean((0, 1, 2)), theirs.astype(np.float64).mean((0, 1)))}
@@ -173,16 +182,23 @@ def block_test(ours: Doubles, theirs: Doubles, variance: Doubles) -> dict[str, A
     own = np.array([block_means(each, BLOCK)[..., 1] for each in ours])
     expected = block_means(theirs, BLOCK)[..., 1]
     rounding = ROUNDING * (np.abs(expected) + theirs[..., 1].mean())
-    squared = own.var(0) / (len(own) - 1) + rounding**2 + block_means(
-        np.maximum(variance, 0), BLOCK)[..., 1] / (BLOCK**2 * REFERENCE_SPP)
+    squared = (
+        own.var(0) / (len(own) - 1)
+        + rounding**2
+        + block_means(np.maximum(variance, 0), BLOCK)[..., 1] / (BLOCK**2 * REFERENCE_SPP)
+    )
     difference = np.maximum(np.abs(own.mean(0) - expected) - HALF * np.abs(expected), 0)
     error = np.sqrt(squared)
     t = np.divide(difference, error, out=np.zeros_like(difference), where=error > 0)
     p = np.array([corrected(t_test(each, len(own) - 1), t.size) for each in t.ravel().tolist()]).reshape(t.shape)
     p[(error == 0) & (difference != 0)] = 0
     lit = expected > 0
-    return {"block_p": float(p.min()), "blocks": p.size, "blocks_rejected": int(np.count_nonzero(p < FAMILY)),
-            "noise": float(np.median(error[lit] / expected[lit])) if lit.any() else 0.0}
+    return {
+        "block_p": float(p.min()),
+        "blocks": p.size,
+        "blocks_rejected": int(np.count_nonzero(p < FAMILY)),
+        "noise": float(np.median(error[lit] / expected[lit])) if lit.any() else 0.0,
+    }
 
 
 def _xyz(pixels: NDArray[Any]) -> Doubles:

@@ -28,8 +28,10 @@ def losses(ior: float, alpha: float) -> tuple[Doubles, Doubles]:
     loss = [1 - sum(weight.sum(axis=1) for weight, _ in parts) for parts in single]
     rest = []
     for side, parts in enumerate(single):
-        kept = sum(np.sum(weight / (1 - np.minimum(loss[side][:, None], _at(loss[there], cosine))), axis=1)
-                   for (weight, cosine), there in zip(parts, (side, 1 - side)))
+        kept = sum(
+            np.sum(weight / (1 - np.minimum(loss[side][:, None], _at(loss[there], cosine))), axis=1)
+            for (weight, cosine), there in zip(parts, (side, 1 - side))
+        )
         rest.append(np.maximum(1 - kept, 0))
     table = np.column_stack([loss[0], rest[0], loss[1], rest[1]])
     means = means_of(table)
@@ -54,7 +56,7 @@ def scattered(eta: float, alpha: float, roots: Doubles = ROOTS) -> list[tuple[Do
     f = np.where(cos_t > 0, _fresnel(cos_h, cos_t, eta), 1)
     parts = []
     for share, cosine in ((f, 2 * cos_h * h - o), (1 - f, o / eta - (cos_h / eta - cos_t) * h)):
-        lambda_o, lambda_i = (np.sqrt(1 + alpha**2 * (1 / np.maximum(c, 1e-9)**2 - 1)) / 2 - 0.5 for c in (o, cosine))
+        lambda_o, lambda_i = (np.sqrt(1 + alpha**2 * (1 / np.maximum(c, 1e-9) ** 2 - 1)) / 2 - 0.5 for c in (o, cosine))
         seen = np.where(cosine > 0, (1 + lambda_o) / (1 + lambda_o + lambda_i), 0)
         parts.append((share * seen / h.shape[1], cosine))
     return parts
@@ -89,7 +91,7 @@ def register(mi: Any) -> None:
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             later = sample1 < LATER
             bs, weight = self.single.sample(ctx, si, (sample1 - LATER) / (1 - LATER), sample2, active & ~later)
-            active &= later | dr.any(weight > 0)    # others go to the wrong side of the surface
+            active &= later | dr.any(weight > 0)  # others go to the wrong side of the surface
             inside = sample1 < LATER * self._inside
             spread = mi.warp.square_to_cosine_hemisphere(sample2)
             spread.z = dr.select(inside, -spread.z, spread.z)
@@ -98,8 +100,9 @@ def register(mi: Any) -> None:
             crosses = bs.wo.z * si.wi.z < 0
             bs.eta = dr.select(crosses, dr.select(si.wi.z > 0, self.ior, 1 / self.ior), 1)
             bs.sampled_component = dr.select(crosses, mi.UInt32(1), mi.UInt32(0))
-            bs.sampled_type = dr.select(crosses, mi.UInt32(+mi.BSDFFlags.GlossyTransmission),
-                                        mi.UInt32(+mi.BSDFFlags.GlossyReflection))
+            bs.sampled_type = dr.select(
+                crosses, mi.UInt32(+mi.BSDFFlags.GlossyTransmission), mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+            )
             active &= bs.pdf > 0
             return bs, dr.select(active, value / dr.maximum(bs.pdf, TINY), 0)
 
@@ -126,7 +129,7 @@ def register(mi: Any) -> None:
 
         def _lost(self, w: Any) -> Any:
             """Return the loss of single scattering and the rest, on the side of w."""
-            outside, inside = (self.table.eval([dr.sqrt(dr.abs(w.z))])[k:k + 2] for k in (0, 2))
+            outside, inside = (self.table.eval([dr.sqrt(dr.abs(w.z))])[k : k + 2] for k in (0, 2))
             return [dr.select(w.z > 0, a, b) for a, b in zip(outside, inside)]
 
         def traverse(self, callback: Any) -> None:
@@ -147,8 +150,9 @@ def register(mi: Any) -> None:
                 self.table = mi.Texture1f(mi.TensorXf((table * multiple).astype(np.float32)))
                 kinds = [mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.GlossyTransmission]
                 cosines = (np.arange(1000) + 0.5) / 1000
-                self.mean_f = float(np.mean(2 * cosines * _fresnel(
-                    cosines, np.sqrt(1 - (1 - cosines**2) / self.ior**2), self.ior)))
+                self.mean_f = float(
+                    np.mean(2 * cosines * _fresnel(cosines, np.sqrt(1 - (1 - cosines**2) / self.ior**2), self.ior))
+                )
             self.m_components = [kind | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide for kind in kinds]
             self.m_flags = self.m_components[0] | self.m_components[1]
 
@@ -167,14 +171,19 @@ def register(mi: Any) -> None:
             through = sample1 < 0.5
             if self.alpha:
                 place = 2 * sample1 - dr.floor(2 * sample1)
-                wo = dr.select(place < LATER, mi.warp.square_to_cosine_hemisphere(sample2),
-                               mi.reflect(wi, self.facets.sample(wi, sample2)[0]))
+                wo = dr.select(
+                    place < LATER,
+                    mi.warp.square_to_cosine_hemisphere(sample2),
+                    mi.reflect(wi, self.facets.sample(wi, sample2)[0]),
+                )
             else:
                 wo = mi.reflect(wi)
             active &= wo.z > 0
             bs.wo = mi.Vector3f(wo.x, wo.y, dr.select(through != (si.wi.z < 0), -wo.z, wo.z))
-            kinds = [mi.UInt32(+(component & (mi.BSDFFlags.Reflection | mi.BSDFFlags.Transmission)))
-                     for component in self.m_components]
+            kinds = [
+                mi.UInt32(+(component & (mi.BSDFFlags.Reflection | mi.BSDFFlags.Transmission)))
+                for component in self.m_components
+            ]
             bs.sampled_type, bs.eta = dr.select(through, kinds[1], kinds[0]), 1.0
             bs.sampled_component = dr.select(through, mi.UInt32(1), mi.UInt32(0))
             if self.alpha:
@@ -201,8 +210,12 @@ def register(mi: Any) -> None:
             single = self.facets.eval(h) * g_i * g_o / dr.maximum((g_i + g_o - g_i * g_o) * 4 * i.z, TINY)
             (loss_i, rest_i), (loss_o, rest_o) = (self.table.eval([dr.sqrt(w.z)]) for w in (i, o))
             later = rest_i * rest_o * o.z / (dr.pi * self.m)
-            value = [divided * single / (1 - dr.minimum(loss_i, loss_o)) + diffuse * later for divided, diffuse in zip(
-                self._divided(self._fresnel(cos_h), si, active), self._divided(self.mean_f, si, active))]
+            value = [
+                divided * single / (1 - dr.minimum(loss_i, loss_o)) + diffuse * later
+                for divided, diffuse in zip(
+                    self._divided(self._fresnel(cos_h), si, active), self._divided(self.mean_f, si, active)
+                )
+            ]
             pdf = (1 - LATER) * self.facets.pdf(i, h) / (4 * cos_h) + LATER * o.z / dr.pi
             active &= (i.z > 0) & (o.z > 0)
             through = si.wi.z * wo.z < 0

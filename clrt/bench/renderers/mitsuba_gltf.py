@@ -44,14 +44,15 @@ def register(mi: Any) -> None:
             mi.BSDF.__init__(self, props)
             self.textures = {name: props.get_texture(name) for name in COLORS + NUMBERS}
             self.smith, self.coupling, self.multiple, self.transmits, self.layered = (
-                props[name] for name in ("smith", "coupling", "multiple", "transmits", "layered"))
+                props[name] for name in ("smith", "coupling", "multiple", "transmits", "layered")
+            )
             self.bumps = props.get("bumps", False)
             rough = [(np.arange(ROWS) + 0.5) / ROWS]
             if self.layered:
                 rough = [np.array([props[f"{name}roughness"]]) for name in ("", "clearcoat_", "sheen_")]
-                film_alpha = max(float(rough[1][0])**2, ALPHA_MIN)
+                film_alpha = max(float(rough[1][0]) ** 2, ALPHA_MIN)
                 self.film = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, film_alpha, film_alpha, True)
-                self.power = max(float(rough[2][0]), SMOOTHEST)**-2
+                self.power = max(float(rough[2][0]), SMOOTHEST) ** -2
                 above = np.column_stack([film_albedo(float(rough[1][0])), fibres(float(rough[2][0]))[2]])
                 self.above = mi.Texture1f(mi.TensorXf(above.astype(np.float32)))
             layers = (float(rough[1][0]), float(rough[2][0])) if self.layered else None
@@ -78,8 +79,9 @@ def register(mi: Any) -> None:
             bs.wo = wo
             value, bs.pdf = self.eval_pdf(ctx, si, bs.wo, active)
             bs.eta, bs.sampled_component = 1.0, mi.UInt32(0)
-            bs.sampled_type = dr.select(through, mi.UInt32(+mi.BSDFFlags.GlossyTransmission),
-                                        mi.UInt32(+mi.BSDFFlags.GlossyReflection))
+            bs.sampled_type = dr.select(
+                through, mi.UInt32(+mi.BSDFFlags.GlossyTransmission), mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+            )
             active &= bs.pdf > 0
             return bs, dr.select(active, value / dr.maximum(bs.pdf, TINY), 0)
 
@@ -99,10 +101,16 @@ def register(mi: Any) -> None:
             gloss = least * self._microfacets(lobes[0], i, o, h, self.smith)
             value = _schlick(m.both0, m.both90, cos_h) * gloss + self._diffuse(m, at, there, mean, cos_h, si, wo) * o.z
             if self.layered:
-                value += m.clearcoat * _schlick(FILM_F0, 1, cos_h) * self._microfacets(
-                    self.film, i, o, h, "height_correlated")
-                value += dr.minimum(at.film, there.film) * m.sheen_color * self._fibres(
-                    i.z, o.z, h.z, dr.maximum(at.fibres, there.fibres))
+                value += (
+                    m.clearcoat
+                    * _schlick(FILM_F0, 1, cos_h)
+                    * self._microfacets(self.film, i, o, h, "height_correlated")
+                )
+                value += (
+                    dr.minimum(at.film, there.film)
+                    * m.sheen_color
+                    * self._fibres(i.z, o.z, h.z, dr.maximum(at.fibres, there.fibres))
+                )
             pdf = (o.z / dr.pi + sum(each.pdf(i, h) / (4 * cos_h) for each in lobes)) / (len(lobes) + 1)
             active &= (i.z > 0) & (o.z > 0)
             if self.transmits:
@@ -121,8 +129,10 @@ def register(mi: Any) -> None:
 
         def _material(self, si: Any, active: Any) -> Any:
             """Return the parameters at a point, and F0 and F90 of the dielectric part and of both parts."""
-            m = SimpleNamespace(**{name: self.textures[name].eval(si, active) for name in COLORS},
-                                **{name: self.textures[name].eval_1(si, active) for name in NUMBERS})
+            m = SimpleNamespace(
+                **{name: self.textures[name].eval(si, active) for name in COLORS},
+                **{name: self.textures[name].eval_1(si, active) for name in NUMBERS},
+            )
             m.f0, m.f90 = dr.minimum(m.f0, 1) * m.specular, m.specular
             m.both0, m.both90 = dr.lerp(m.f0, m.color, m.metallic), dr.lerp(m.f90, 1, m.metallic)
             albedo = (1 - m.metallic) * m.color
@@ -152,14 +162,23 @@ def register(mi: Any) -> None:
         def _energy(self, m: Any, parts: Any) -> Any:
             """Return `left` (PARTS, interpolated between the corners), T·lost, T·r and R."""
             c, s = m.clearcoat, m.sheen
-            corners = zip(((1 - c) * (1 - s), c * (1 - s), (1 - c) * s, c * s),
-                          (parts[k:k + PARTS] for k in range(0, len(parts), PARTS)))
-            left = parts if not self.layered else [sum(each) for each in zip(*(
-                [weight * part for part in corner] for weight, corner in corners))]
+            corners = zip(
+                ((1 - c) * (1 - s), c * (1 - s), (1 - c) * s, c * s),
+                (parts[k : k + PARTS] for k in range(0, len(parts), PARTS)),
+            )
+            left = (
+                parts
+                if not self.layered
+                else [sum(each) for each in zip(*([weight * part for part in corner] for weight, corner in corners))]
+            )
             at = SimpleNamespace(left=left, lost=left[0] - left[1])
             at.body = m.albedo * (left[0] - m.f0 * (left[1] - left[2]) - m.f90 * left[2])
-            at.taken = m.both0 * left[3] + m.both90 * left[4] + m.sheen_color * left[5] + m.through * (
-                (1 - m.f0) * left[3] + (1 - m.f90) * left[4])
+            at.taken = (
+                m.both0 * left[3]
+                + m.both90 * left[4]
+                + m.sheen_color * left[5]
+                + m.through * ((1 - m.f0) * left[3] + (1 - m.f90) * left[4])
+            )
             at.all = at.body + m.bounced * at.lost + at.taken
             return at
 
@@ -184,7 +203,8 @@ def register(mi: Any) -> None:
                 crossing = 1 - _schlick(m.both0, m.both90, cos_h)
                 if self.coupling == "fresnel":
                     crossing = (1 - _schlick(m.both0, m.both90, at.cosine)) * (
-                        1 - _schlick(m.both0, m.both90, there.cosine))
+                        1 - _schlick(m.both0, m.both90, there.cosine)
+                    )
                 scale = at.left[0] * there.left[0] / dr.maximum(mean.left[0], TINY) / dr.pi
                 lost = [1 - each.left[1] / dr.maximum(each.left[0], TINY) for each in (at, there)]
                 lost.append(dr.maximum(1 - self.means.eval([m.roughness])[1], TINY))

@@ -54,7 +54,7 @@ def angle_tables(roughnesses: tuple[float, ...], smith: Smith, layers: tuple[flo
 def means_of(table: Doubles) -> Doubles:
     """Return the cosine-weighted means over the hemisphere, ∫ 2·cos·f dcos, of a table whose last axes are ROOTS and
     values."""
-    return np.asarray(np.mean(4 * ROOTS[:, None]**3 * table, axis=-2))
+    return np.asarray(np.mean(4 * ROOTS[:, None] ** 3 * table, axis=-2))
 
 
 def film_albedo(roughness: float) -> Doubles:
@@ -67,19 +67,19 @@ def fibres(roughness: float) -> tuple[Doubles, Doubles, Doubles]:
     """Return cosines (1, POINTS), the bounded light (SIDE, POINTS) that white sheen scatters there from ROOTS, and its
     unbounded albedos (SIDE,).
     """
-    n = max(roughness, SMOOTHEST)**-2    # the power of sin θh
+    n = max(roughness, SMOOTHEST) ** -2  # the power of sin θh
 
     def sent(o: Doubles) -> Doubles:
         i, phi = MIDDLES**2, np.pi * MIDDLES[:, None, None]
-        along = np.sqrt((1 - o[:, None]**2) * (1 - i**2)) * np.cos(phi)
-        cos2_h = (o[:, None] + i)**2 / (2 * (1 + o[:, None] * i + along))
-        d = (2 + n) / (2 * np.pi) * np.mean(np.maximum(1 - cos2_h, 0)**(n / 2), axis=0)
+        along = np.sqrt((1 - o[:, None] ** 2) * (1 - i**2)) * np.cos(phi)
+        cos2_h = (o[:, None] + i) ** 2 / (2 * (1 + o[:, None] * i + along))
+        d = (2 + n) / (2 * np.pi) * np.mean(np.maximum(1 - cos2_h, 0) ** (n / 2), axis=0)
         value = 2 * np.pi * d * i / (4 * (o[:, None] + i - o[:, None] * i))
-        return np.asarray(value * 2 * MIDDLES / POINTS)    # dcos = 2·root·droot
+        return np.asarray(value * 2 * MIDDLES / POINTS)  # dcos = 2·root·droot
 
     values, there = sent(ROOTS**2), sent(MIDDLES**2).sum(axis=1)
     unbounded = values.sum(axis=1)
-    return MIDDLES[None]**2, values / np.maximum(np.maximum(unbounded[:, None], there), 1), unbounded
+    return MIDDLES[None] ** 2, values / np.maximum(np.maximum(unbounded[:, None], there), 1), unbounded
 
 
 def gloss(alpha: float, smith: Smith) -> tuple[Doubles, Doubles, Doubles]:
@@ -89,7 +89,7 @@ def gloss(alpha: float, smith: Smith) -> tuple[Doubles, Doubles, Doubles]:
     i = 2 * cos_h * up - o
     lambda_o = np.sqrt(1 + alpha**2 * (1 / o**2 - 1)) / 2 - 0.5
     seen = np.where(i > 0, shadowing(o, np.maximum(i, 1e-9), alpha, smith) * (1 + lambda_o), 0)
-    return i, seen / POINTS**2, np.clip(1 - cos_h, 0, 1)**5
+    return i, seen / POINTS**2, np.clip(1 - cos_h, 0, 1) ** 5
 
 
 def normals(alpha: float, roots: Doubles = ROOTS) -> tuple[Doubles, Doubles]:

@@ -57,8 +57,12 @@ class Mitsuba:
 
 def newest_llvm(root: Path = Path("/")) -> tuple[int, Path | None]:
     """Return version and file of the newest LLVM library in LLVM_FOLDERS; 0 and None if there is none."""
-    found = {int(version[1]): file for folder in LLVM_FOLDERS for file in root.glob(f"{folder}/libLLVM*")
-             if (version := re.match(r"libLLVM(?:-|\.so\.)(\d+)", file.name))}
+    found = {
+        int(version[1]): file
+        for folder in LLVM_FOLDERS
+        for file in root.glob(f"{folder}/libLLVM*")
+        if (version := re.match(r"libLLVM(?:-|\.so\.)(\d+)", file.name))
+    }
     return max(found.items(), default=(0, None))
 
 
@@ -90,15 +94,22 @@ def _native(library: Any, value: Any) -> Any:
     return value
 
 
-def _mesh(library: Any, *, vertices: Any, faces: Any, normals: Any, uv: Any = None, colors: Any = None,
-          **plugins: Any) -> Any:
+def _mesh(
+    library: Any, *, vertices: Any, faces: Any, normals: Any, uv: Any = None, colors: Any = None, **plugins: Any
+) -> Any:
     """Return a mesh with its BSDF and emitter; flat-shaded if it has no normals."""
     properties = library.Properties()
     properties["face_normals"] = normals is None
     for name, plugin in plugins.items():
         properties[name] = library.load_dict(plugin)
-    mesh = library.Mesh("mesh", len(vertices), len(faces), properties, has_vertex_normals=normals is not None,
-                        has_vertex_texcoords=uv is not None)
+    mesh = library.Mesh(
+        "mesh",
+        len(vertices),
+        len(faces),
+        properties,
+        has_vertex_normals=normals is not None,
+        has_vertex_texcoords=uv is not None,
+    )
     if colors is not None:
         mesh.add_attribute("vertex_color", 3, colors.ravel())
     arrays = library.traverse(mesh)

@@ -45,10 +45,16 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
     depth = scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
     owners: list[Mesh | Sphere] = [*unfolded(scene).meshes, *scene.spheres]
     absorbs = any(isinstance(owner.material, Dielectric) and medium(owner.material) for owner in owners)
-    plugins: Plugin = {"type": "scene", "sensor": _sensor(scene, sampler),
-                       "integrator": {"type": "volpath" if absorbs else "path", "max_depth": depth}}
-    plugins |= {f"{'mesh' if isinstance(owner, Mesh) else 'sphere'}{i}": _surface(owner)
-                for kind in (Mesh, Sphere) for i, owner in enumerate(each for each in owners if isinstance(each, kind))}
+    plugins: Plugin = {
+        "type": "scene",
+        "sensor": _sensor(scene, sampler),
+        "integrator": {"type": "volpath" if absorbs else "path", "max_depth": depth},
+    }
+    plugins |= {
+        f"{'mesh' if isinstance(owner, Mesh) else 'sphere'}{i}": _surface(owner)
+        for kind in (Mesh, Sphere)
+        for i, owner in enumerate(each for each in owners if isinstance(each, kind))
+    }
     plugins |= {f"light{i}": _light(light, scene.camera) for i, light in enumerate(scene.lights)}
     return plugins | _environment(scene.environment)
 
@@ -63,16 +69,30 @@ def _sensor(scene: Scene, sampler: str) -> Plugin:
         raise UsageError(f"{scene.name}: Mitsuba has no {camera.projection} camera")
     if camera.projection == "orthographic":
         tall = camera.view_height or 2 * distance * tan(radians(camera.fov_degrees) / 2)
-        lens = {"type": "orthographic"}    # x from -1 to 1
+        lens = {"type": "orthographic"}  # x from -1 to 1
         to_world = to_world @ np.diag([tall * width / height / 2, tall * width / height / 2, 1, 1])
     elif camera.aperture_radius:
-        lens |= {"type": "thinlens", "aperture_radius": camera.aperture_radius,
-                 "focus_distance": camera.focus_distance or distance}
-    return {**lens, "to_world": to_world, "near_clip": NEAR * distance, "far_clip": FAR * distance,
-            "sampler": {"type": sampler},
-            "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
-                     "component_format": "float32", "rfilter": {"type": scene.render.filter},
-                     "sample_border": scene.render.filter != "box"}}
+        lens |= {
+            "type": "thinlens",
+            "aperture_radius": camera.aperture_radius,
+            "focus_distance": camera.focus_distance or distance,
+        }
+    return {
+        **lens,
+        "to_world": to_world,
+        "near_clip": NEAR * distance,
+        "far_clip": FAR * distance,
+        "sampler": {"type": sampler},
+        "film": {
+            "type": "hdrfilm",
+            "width": width,
+            "height": height,
+            "pixel_format": "rgb",
+            "component_format": "float32",
+            "rfilter": {"type": scene.render.filter},
+            "sample_border": scene.render.filter != "box",
+        },
+    }
 
 
 def _frame(position: Any, direction: Any, up: Any = (0.0, 1.0, 0.0)) -> NDArray[np.float64]:
@@ -145,14 +165,19 @@ def _light(light: Light, camera: Camera) -> Plugin:
 def _sun(light: DirectionalLight, camera: Camera) -> Plugin:
     """Return a disc so far away that its direction is the same everywhere; Mitsuba has no emitter for a sun."""
     if light.angle_degrees > SUN_DEGREES:
-        raise UsageError(f"light: Mitsuba is compared with suns of up to {SUN_DEGREES} degrees; this one has "
-                         f"angle_degrees = {light.angle_degrees:g}")
+        raise UsageError(
+            f"light: Mitsuba is compared with suns of up to {SUN_DEGREES} degrees; this one has "
+            f"angle_degrees = {light.angle_degrees:g}"
+        )
     far = SUN_DISTANCE * _distance(camera)
     towards = -np.asarray(light.direction) / np.linalg.norm(light.direction)
     radius = far * tan(radians(light.angle_degrees) / 2)
     place = _frame(camera.look_at + far * towards, light.direction, _up_for(light.direction))
-    return {"type": "disk", "to_world": place @ np.diag([radius, radius, 1, 1]),
-            "emitter": {"type": "area", "radiance": rgb(light.radiance)}}
+    return {
+        "type": "disk",
+        "to_world": place @ np.diag([radius, radius, 1, 1]),
+        "emitter": {"type": "area", "radiance": rgb(light.radiance)},
+    }
 
 
 def _up_for(direction: Any) -> tuple[float, float, float]:
@@ -168,10 +193,19 @@ def _spot(light: SpotLight) -> Plugin:
     off = np.hypot(across[:, None], across) * tan(radians(light.outer_degrees))
     inner, outer = cos(radians(light.inner_degrees)), cos(radians(light.outer_degrees))
     falloff = np.clip((1 / np.sqrt(1 + off**2) - outer) / (inner - outer), 0, 1) ** 2
-    return {"type": "spot", "to_world": _frame(light.position, light.direction, _up_for(light.direction)),
-            "intensity": rgb(light.intensity), "cutoff_angle": light.outer_degrees, "beam_width": light.outer_degrees,
-            "texture": {"type": "bitmap", "bitmap": np.repeat(falloff[..., None], 3, 2).astype(np.float32),
-                        "raw": True, "wrap_mode": "clamp"}}
+    return {
+        "type": "spot",
+        "to_world": _frame(light.position, light.direction, _up_for(light.direction)),
+        "intensity": rgb(light.intensity),
+        "cutoff_angle": light.outer_degrees,
+        "beam_width": light.outer_degrees,
+        "texture": {
+            "type": "bitmap",
+            "bitmap": np.repeat(falloff[..., None], 3, 2).astype(np.float32),
+            "raw": True,
+            "wrap_mode": "clamp",
+        },
+    }
 
 
 def _environment(environment: Environment) -> Plugin:
@@ -182,8 +216,14 @@ def _environment(environment: Environment) -> Plugin:
     angle = np.radians(environment.rotation_degrees)
     turned = np.eye(4)
     turned[np.ix_([0, 2], [0, 2])] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
-    return {"sky": {"type": "envmap", "bitmap": rows_at_poles(environment.image), "to_world": turned,
-                    "scale": environment.strength}}
+    return {
+        "sky": {
+            "type": "envmap",
+            "bitmap": rows_at_poles(environment.image),
+            "to_world": turned,
+            "scale": environment.strength,
+        }
+    }
 
 
 def rows_at_poles(image: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -58,7 +58,7 @@ class Plastic:
         x, weights = np.polynomial.legendre.leggauss(NODES)
         self._roots = (x + 1) / 2
         self._albedos = np.array([self._albedo(root**2) for root in self._roots])
-        self._kept = 1 - float(np.sum(2 * weights * self._roots**3 * self._albedos))   # mean E = ∫ 2c·E dc, c = root²
+        self._kept = 1 - float(np.sum(2 * weights * self._roots**3 * self._albedos))  # mean E = ∫ 2c·E dc, c = root²
 
     def __call__(self, wo: Doubles, wi: Doubles) -> Doubles:
         """Evaluate f, (n,)."""
@@ -97,22 +97,22 @@ class Plastic:
         angle, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS, indexing="ij")
         share = (np.sin(2 * angle) * weights[:, None] * np.pi / 4 / DIRECTIONS).ravel()
         wo = np.tile([np.sqrt(1 - cosine**2), cosine, 0.0], (share.size, 1))
-        wi = self.draw(wo, np.column_stack([np.sin(angle).ravel()**2, turn.ravel()]))
+        wi = self.draw(wo, np.column_stack([np.sin(angle).ravel() ** 2, turn.ravel()]))
         up = wi[:, 1] > 0
-        seen = self._shadowing(wo[:, 1], np.where(up, wi[:, 1], 1)) * (1 + self._lambda(wo[:, 1]))    # G2/G1
+        seen = self._shadowing(wo[:, 1], np.where(up, wi[:, 1], 1)) * (1 + self._lambda(wo[:, 1]))  # G2/G1
         return float(np.sum((share * seen * self._fresnel(np.sum(wo * _unit(wo + wi), axis=1)))[up]))
 
     def _fresnel(self, cosine: Doubles) -> Doubles:
         if not self._model.exact:
-            f0 = ((self.IOR - 1) / (self.IOR + 1))**2
-            return f0 + (1 - f0) * np.maximum(1 - cosine, 0)**5
+            f0 = ((self.IOR - 1) / (self.IOR + 1)) ** 2
+            return f0 + (1 - f0) * np.maximum(1 - cosine, 0) ** 5
         refracted = np.sqrt(1 - (1 - cosine**2) / self.IOR**2)
         across = (cosine - self.IOR * refracted) / (cosine + self.IOR * refracted)
         along = (self.IOR * cosine - refracted) / (self.IOR * cosine + refracted)
         return np.asarray((across**2 + along**2) / 2)
 
     def _distribution(self, cosine: Doubles) -> Doubles:
-        return np.asarray(self.alpha**2 / (np.pi * (1 - cosine**2 * (1 - self.alpha**2))**2))
+        return np.asarray(self.alpha**2 / (np.pi * (1 - cosine**2 * (1 - self.alpha**2)) ** 2))
 
     def _lambda(self, cosine: Doubles) -> Doubles:
         return np.asarray((np.sqrt(1 + self.alpha**2 * (1 / cosine**2 - 1)) - 1) / 2)
@@ -151,7 +151,7 @@ class Sky:
         self._texels = environment.strength * environment.image[..., 0].astype(np.float64)
         height, width = self._texels.shape
         rows = np.pad(np.pad(self._texels, ((1, 1), (0, 0)), "edge"), ((0, 0), (1, 1)), "wrap")
-        bounds = np.max([rows[y:y + height, x:x + width] for y in range(3) for x in range(3)], axis=0)
+        bounds = np.max([rows[y : y + height, x : x + width] for y in range(3) for x in range(3)], axis=0)
         weights = bounds * np.sin((np.arange(height) + 0.5) / height * np.pi)[:, None]
         self._chances = weights / weights.sum()
         self._sums = np.cumsum(self._chances)
@@ -173,9 +173,10 @@ class Sky:
         column, row = np.floor(u - 0.5).astype(int), np.floor(v - 0.5).astype(int)
         x, y = u - 0.5 - column, v - 0.5 - row
         rows = [np.clip(row + k, 0, height - 1) for k in (0, 1)]
-        upper, lower = ((1 - x) * self._texels[each, column % width] + x * self._texels[each, (column + 1) % width]
-                        for each in rows)
-        sine = np.maximum(np.sqrt(np.maximum(1 - wi[:, 1]**2, 0)), 1e-12)
+        upper, lower = (
+            (1 - x) * self._texels[each, column % width] + x * self._texels[each, (column + 1) % width] for each in rows
+        )
+        sine = np.maximum(np.sqrt(np.maximum(1 - wi[:, 1] ** 2, 0)), 1e-12)
         chance = self._chances[np.minimum(v.astype(int), height - 1), np.minimum(u.astype(int), width - 1)]
         return (1 - y) * upper + y * lower, chance * height * width / (2 * np.pi**2 * sine)
 
@@ -201,7 +202,7 @@ def floor_radiance(scene: Scene, model: Model = MODELS["model"], seed: int = 0) 
             means.append(sum(float(np.mean(_delta(bsdf, light, p, wo))) for light in scene.lights))
         else:
             means.append(float(np.mean(_extended(bsdf, plastic, source, p, wo, rng.random((BATCH, 2))))))
-    return Estimate(float(np.mean(means)), float(np.std(means) / (BATCHES - 1)**0.5))
+    return Estimate(float(np.mean(means)), float(np.std(means) / (BATCHES - 1) ** 0.5))
 
 
 def _seen(camera: Camera, u: Doubles) -> tuple[Doubles, Doubles]:

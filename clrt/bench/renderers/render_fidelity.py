@@ -73,8 +73,9 @@ class Effort(NamedTuple):
     device: int
 
 
-def judge(found: Sequence[Scenario], width: int | None, spp: int, denoise: bool = False,
-          device: str | int | None = None) -> Iterator[Judged]:
+def judge(
+    found: Sequence[Scenario], width: int | None, spp: int, denoise: bool = False, device: str | int | None = None
+) -> Iterator[Judged]:
     """Yield each scenario, rendered `width` pixels wide (None: its own) and compared at the website's size or less.
 
     The row's result: inside or outside of the others' spread; no spread if fewer than two have an image; missing if
@@ -83,8 +84,9 @@ def judge(found: Sequence[Scenario], width: int | None, spp: int, denoise: bool 
     try:
         import flip_evaluator  # noqa: F401
     except ImportError:
-        raise UsageError("FLIP needs flip-evaluator; run pip install flip-evaluator (for Python 3.11 to 3.13, not for "
-                         "Linux on ARM)") from None
+        raise UsageError(
+            "FLIP needs flip-evaluator; run pip install flip-evaluator (for Python 3.11 to 3.13, not for Linux on ARM)"
+        ) from None
     effort = Effort(width, spp, Denoiser() if denoise else None, choose(device)[0].index)
     for scenario in found:
         row: dict[str, Any] = {"scenario": scenario.name}
@@ -118,10 +120,15 @@ def _warnings() -> Iterator[list[str]]:
 def _scene(scenario: Scenario, width: int | None) -> Scene:
     """Return the model with its own lights, with the scenario's environment and camera."""
     model = read_model(scenario.model)
-    scene = Scene(meshes=model.meshes, instances=model.instances, lights=model.lights, camera=scenario.camera,
-                  environment=Environment(image=read_picture(scenario.lighting), rotation_degrees=ROTATION),
-                  render=RenderSettings(size=_size(scenario, width or scenario.size[0]), max_depth=DEPTH),
-                  name=scenario.name)
+    scene = Scene(
+        meshes=model.meshes,
+        instances=model.instances,
+        lights=model.lights,
+        camera=scenario.camera,
+        environment=Environment(image=read_picture(scenario.lighting), rotation_degrees=ROTATION),
+        render=RenderSettings(size=_size(scenario, width or scenario.size[0]), max_depth=DEPTH),
+        name=scenario.name,
+    )
     validate(scene)
     return scene
 
@@ -148,9 +155,13 @@ def _judged(row: dict[str, Any], scenario: Scenario, scene: Scene, effort: Effor
     names = np.array([_material_name(part) for part in [*scene.meshes, *(one.mesh for one in scene.instances)]] + [""])
     regions = {"": np.ones(stored.shape, np.bool_)} | {
         str(name): stored & _wholly(inside & (objects >= 0) & (names[objects] == name), size)
-        for name in dict.fromkeys(names[:-1])}
-    means = {name: {renderer: float((image[where] @ LUMINANCE).mean()) for renderer, image in images.items()}
-             for name, where in regions.items() if where.mean() >= LEAST}
+        for name in dict.fromkeys(names[:-1])
+    }
+    means = {
+        name: {renderer: float((image[where] @ LUMINANCE).mean()) for renderer, image in images.items()}
+        for name, where in regions.items()
+        if where.mean() >= LEAST
+    }
     return Judged(row | verdict(images, means), images)
 
 
@@ -165,8 +176,9 @@ def _material_name(mesh: Mesh) -> str:
 
 def _rendered(scene: Scene, effort: Effort) -> tuple[Floats, NDArray[np.int32]]:
     """Return the pixels, and the object ids of the first hits."""
-    renderer = Renderer(scene, device=effort.device, spp=effort.spp, aovs="object",
-                        first_hits=effort.denoiser is not None)
+    renderer = Renderer(
+        scene, device=effort.device, spp=effort.spp, aovs="object", first_hits=effort.denoiser is not None
+    )
     *_, state = renderer.passes(spp=effort.spp)
     objects = np.asarray(renderer.aovs(state)["object"], np.int32)
     if effort.denoiser is None:
@@ -180,17 +192,28 @@ def _without_background(scene: Scene, pixels: Floats, effort: Effort) -> tuple[F
 
     A pixel mixes surfaces and background by coverage; tone mapping applies to the surfaces only.
     """
+
     def white(material: Material) -> Diffuse:
         return Diffuse(color=(1.0, 1.0, 1.0), opacity=material.opacity, alpha_cutoff=material.alpha_cutoff)
 
     def masked(mesh: Mesh) -> Mesh:
-        return replace(mesh, material=white(mesh.material), colors=None if mesh.colors is None else np.concatenate(
-            [np.ones_like(mesh.colors[:, :3]), mesh.colors[:, 3:]], axis=1))
+        return replace(
+            mesh,
+            material=white(mesh.material),
+            colors=None
+            if mesh.colors is None
+            else np.concatenate([np.ones_like(mesh.colors[:, :3]), mesh.colors[:, 3:]], axis=1),
+        )
 
     meshes = {id(mesh): masked(mesh) for mesh in [*scene.meshes, *(one.mesh for one in scene.instances)]}
-    mask = replace(scene, meshes=[meshes[id(mesh)] for mesh in scene.meshes], instances=[
-        replace(one, mesh=meshes[id(one.mesh)], material=None) for one in scene.instances], lights=[],
-        environment=Environment(), render=replace(scene.render, integrator="albedo"))
+    mask = replace(
+        scene,
+        meshes=[meshes[id(mesh)] for mesh in scene.meshes],
+        instances=[replace(one, mesh=meshes[id(one.mesh)], material=None) for one in scene.instances],
+        lights=[],
+        environment=Environment(),
+        render=replace(scene.render, integrator="albedo"),
+    )
     alpha = np.clip(_rendered(mask, effort)[0][..., :1], 0, 1)
     background, _ = _rendered(replace(scene, meshes=[], instances=[], lights=[]), effort)
     surfaces = np.maximum(pixels - (1 - alpha) * background, 0) / np.maximum(alpha, 1e-3)
@@ -202,18 +225,29 @@ def verdict(images: Mapping[str, Floats], means: Mapping[str, Means]) -> dict[st
     means: by region ("" is the whole image), with `beyond`, clrt's factor outside their range (1 inside, < 1 too dark).
     """
     others = [name for name in images if name != "clrt"]
-    distances = {(a, b): _flip(images[a], images[b]) for i, a in enumerate(images) for b in [*images][i + 1:]}
-    mean_flip = {a: float(np.mean([value for pair, value in distances.items() if a in pair and (
-        a == "clrt" or "clrt" not in pair)])) for a in images if len(others) > 1}
-    found: dict[str, Any] = {"flip": {name: distances["clrt", name] for name in others},
-                             "means": {name: {**each, "beyond": _beyond(each)} for name, each in means.items()}}
+    distances = {(a, b): _flip(images[a], images[b]) for i, a in enumerate(images) for b in [*images][i + 1 :]}
+    mean_flip = {
+        a: float(
+            np.mean([value for pair, value in distances.items() if a in pair and (a == "clrt" or "clrt" not in pair)])
+        )
+        for a in images
+        if len(others) > 1
+    }
+    found: dict[str, Any] = {
+        "flip": {name: distances["clrt", name] for name in others},
+        "means": {name: {**each, "beyond": _beyond(each)} for name, each in means.items()},
+    }
     if len(others) < 2:
         return found | {"result": "no spread"}
     spread = max(mean_flip[name] for name in others)
     strayed = [name for name, each in found["means"].items() if abs(np.log(each["beyond"])) > np.log1p(MARGIN)]
     inside = mean_flip["clrt"] <= spread and not strayed
-    return found | {"mean_flip": mean_flip["clrt"], "spread": spread, "strayed": strayed,
-                    "result": "inside" if inside else "outside"}
+    return found | {
+        "mean_flip": mean_flip["clrt"],
+        "spread": spread,
+        "strayed": strayed,
+        "result": "inside" if inside else "outside",
+    }
 
 
 def _beyond(means: Means) -> float:

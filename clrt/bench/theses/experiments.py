@@ -27,7 +27,8 @@ RASTER: dict[str, Any] = {"integrator": "raster", "shadows": False, "max_depth":
 MIRRORS: list[tuple[str, str, Material, bool, tuple[float, ...]]] = [
     ("mirrors", "S 7.5, shot 2: between two parallel mirrors", STONE, False, (446, 440, 435)),
     ("mirror", "S 7.5, shot 2, the statue a mirror", GLASS, False, (215, 187, 174)),
-    ("far", "S 7.5, shot 3, the statue a mirror, less of it in view", GLASS, True, (300, 277, 268))]
+    ("far", "S 7.5, shot 3, the statue a mirror, less of it in view", GLASS, True, (300, 277, 268)),
+]
 #: Distance by which the camera alternates between frames.
 STEP = 1e-4
 DEPTHS, MORE_DEPTHS = (4, 10, 25), (1, 2, 4, 7, 10, 16, 25, 40)
@@ -94,46 +95,83 @@ class Models:
 def experiments(effort: Effort = Effort(), models: Models = Models()) -> Iterator[Experiment]:
     """Yield all experiments, in the order of the theses."""
     part = effort.part
-    yield _with_and_without("dragon", "N table 5.1: a dragon of 19 332 triangles, 2200x1331, 10 bounces, 6 rays",
-                            dragon_scene(models.dragon), effort, 19.54e-3, None, part, 697e-3)
-    yield _with_and_without("tree", "N table 5.2: a tree of 264 triangles, likewise", tree_scene(models.tree), effort,
-                            7.76e-3, 60e-3, 1)
+    yield _with_and_without(
+        "dragon",
+        "N table 5.1: a dragon of 19 332 triangles, 2200x1331, 10 bounces, 6 rays",
+        dragon_scene(models.dragon),
+        effort,
+        19.54e-3,
+        None,
+        part,
+        697e-3,
+    )
+    yield _with_and_without(
+        "tree", "N table 5.2: a tree of 264 triangles, likewise", tree_scene(models.tree), effort, 7.76e-3, 60e-3, 1
+    )
     yield _shadows(effort, models)
     for name, title, material, far, traced in MIRRORS:
         scene = hall(effort.detail, models.statue, mirrors=True, figure=material, far=far)
         yield _mirrors(name, title, scene, effort, dict(zip(DEPTHS, traced)))
 
 
-def _with_and_without(name: str, title: str, scene: Scene, effort: Effort, theirs: float, without: float | None,
-                      part: int, less: float | None = None) -> Experiment:
+def _with_and_without(
+    name: str,
+    title: str,
+    scene: Scene,
+    effort: Effort,
+    theirs: float,
+    without: float | None,
+    part: int,
+    less: float | None = None,
+) -> Experiment:
     """Return an experiment with and without a BVH. less: their time without, for two bounces and one ray per pixel."""
     scene = _smaller(scene, effort)
     all_of_it, few = {"max_depth": TEN_BOUNCES, "spp": 6}, {"max_depth": TWO_BOUNCES, "spp": 1}
-    variants = [Variant("with a tree", scene, all_of_it, theirs),
-                Variant("without", scene, {**all_of_it, "layout": "list"}, without, 2 * part if part > 1 else 1),
-                Variant("without, eight at a time", scene, {**all_of_it, "layout": "packs"}, None, part)]
+    variants = [
+        Variant("with a tree", scene, all_of_it, theirs),
+        Variant("without", scene, {**all_of_it, "layout": "list"}, without, 2 * part if part > 1 else 1),
+        Variant("without, eight at a time", scene, {**all_of_it, "layout": "packs"}, None, part),
+    ]
     ratios = [("without", "with a tree"), ("without, eight at a time", "with a tree")]
     if less is not None:
-        variants += [Variant("without, 2 bounces, 1 ray", scene, {**few, "layout": "list"}, less, part),
-                     Variant("eight at a time, 2 bounces, 1 ray", scene, {**few, "layout": "packs"}, None, part)]
+        variants += [
+            Variant("without, 2 bounces, 1 ray", scene, {**few, "layout": "list"}, less, part),
+            Variant("eight at a time, 2 bounces, 1 ray", scene, {**few, "layout": "packs"}, None, part),
+        ]
         ratios += [("without, 2 bounces, 1 ray", "with a tree"), ("eight at a time, 2 bounces, 1 ray", "with a tree")]
     return Experiment(name, title, "N", variants, ratios)
 
 
 def _shadows(effort: Effort, models: Models) -> Experiment:
     scene = _smaller(hall(effort.detail, models.statue), effort)
-    variants = [Variant("hard shadows, traced", scene, {"max_depth": 2}, 1 / 537),
-                Variant("rasterised, no shadows", scene, RASTER, 1 / 540)]
-    return Experiment("shadows", "S 7.5: a hall of 700 thousand triangles and a point light, 1280x720", "S", variants,
-                      [("hard shadows, traced", "rasterised, no shadows")])
+    variants = [
+        Variant("hard shadows, traced", scene, {"max_depth": 2}, 1 / 537),
+        Variant("rasterised, no shadows", scene, RASTER, 1 / 540),
+    ]
+    return Experiment(
+        "shadows",
+        "S 7.5: a hall of 700 thousand triangles and a point light, 1280x720",
+        "S",
+        variants,
+        [("hard shadows, traced", "rasterised, no shadows")],
+    )
 
 
 def _mirrors(name: str, title: str, scene: Scene, effort: Effort, traced: Mapping[int, float]) -> Experiment:
     scene = _smaller(scene, effort)
-    variants = [Variant(f"depth {depth}", scene, {"max_depth": depth + 1},
-                        1 / traced[depth] if depth in traced else None, depth=depth) for depth in effort.depths]
-    dull = replace(scene, meshes=[replace(mesh, material=STONE) if mesh.material == GLASS else mesh
-                                  for mesh in scene.meshes])
+    variants = [
+        Variant(
+            f"depth {depth}",
+            scene,
+            {"max_depth": depth + 1},
+            1 / traced[depth] if depth in traced else None,
+            depth=depth,
+        )
+        for depth in effort.depths
+    ]
+    dull = replace(
+        scene, meshes=[replace(mesh, material=STONE) if mesh.material == GLASS else mesh for mesh in scene.meshes]
+    )
     variants.append(Variant("rasterised, no reflections", dull, RASTER, 1 / 530 if name == "mirrors" else None))
     return Experiment(name, title, "S", variants, [("depth 25", "depth 4")])
 
@@ -143,8 +181,13 @@ def _smaller(scene: Scene, effort: Effort) -> Scene:
     return replace(scene, render=replace(scene.render, size=(width // effort.smaller, height // effort.smaller)))
 
 
-def measure_theses(effort: Effort = Effort(), models: Models = Models(), *, device: str | int | None = None,
-                   say: Callable[[str], None] = lambda message: None) -> Iterator[dict[str, Any]]:
+def measure_theses(
+    effort: Effort = Effort(),
+    models: Models = Models(),
+    *,
+    device: str | int | None = None,
+    say: Callable[[str], None] = lambda message: None,
+) -> Iterator[dict[str, Any]]:
     """Yield the results of `clrt bench theses`, experiment by experiment.
 
     name, title, thesis, machine (theirs), device, device_type, platform; triangles, size; rows: for each variant
@@ -167,8 +210,12 @@ def _renderer(variant: Variant, variants: Sequence[Variant], device: str | int |
     """Return a renderer for all variants that share it: some devices must know the largest depth."""
     width, height = variant.scene.render.size
     depths = [other.max_depth for other in variants if other.shared == variant.shared]
-    return Renderer(variant.scene, device=device, **{"spp": 1, **variant.options, "max_depth": max(depths)},
-                    size=(max(1, width // variant.part), max(1, height // variant.part)))
+    return Renderer(
+        variant.scene,
+        device=device,
+        **{"spp": 1, **variant.options, "max_depth": max(depths)},
+        size=(max(1, width // variant.part), max(1, height // variant.part)),
+    )
 
 
 class Taken(NamedTuple):
@@ -218,20 +265,38 @@ def _figures(experiment: Experiment, runs: Mapping[str, Run], taken: Mapping[str
     rows: dict[str, dict[str, Any]] = {}
     for name, run in runs.items():
         seconds, cpu_seconds = (median(each) for each in zip(*taken[name]))
-        rows[name] = {"seconds": seconds, "cpu_seconds": cpu_seconds, "frames": len(taken[name]),
-                      "mean": fmean(frame.seconds for frame in taken[name]),
-                      "frames_per_second": 1 / seconds, "rays": run.rays, "samples": run.samples,
-                      "theirs": run.variant.theirs, "part": run.variant.part, "depth": run.variant.depth,
-                      "layout": run.renderer.compiled.tree.name}
+        rows[name] = {
+            "seconds": seconds,
+            "cpu_seconds": cpu_seconds,
+            "frames": len(taken[name]),
+            "mean": fmean(frame.seconds for frame in taken[name]),
+            "frames_per_second": 1 / seconds,
+            "rays": run.rays,
+            "samples": run.samples,
+            "theirs": run.variant.theirs,
+            "part": run.variant.part,
+            "depth": run.variant.depth,
+            "layout": run.renderer.compiled.tree.name,
+        }
     ratios = []
     for name, other in experiment.ratios:
         above, below = runs[name].variant.theirs, runs[other].variant.theirs
         ours, cpu = (rows[name][key] / max(rows[other][key], 1e-9) for key in ("seconds", "cpu_seconds"))
-        ratios.append({"of": name, "over": other, "ours": ours, "cpu": cpu,
-                       "theirs": above / below if above and below else None})
+        ratios.append(
+            {"of": name, "over": other, "ours": ours, "cpu": cpu, "theirs": above / below if above and below else None}
+        )
     first = next(iter(runs.values())).renderer
     info = first.device.info
-    return {"name": experiment.name, "title": experiment.title, "thesis": experiment.thesis,
-            "machine": MACHINES[experiment.thesis], "device": info.name, "device_type": info.type,
-            "platform": info.platform, "triangles": int(first.compiled.counts["triangles"][0]),
-            "size": experiment.variants[0].scene.render.size, "rows": rows, "ratios": ratios}
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "thesis": experiment.thesis,
+        "machine": MACHINES[experiment.thesis],
+        "device": info.name,
+        "device_type": info.type,
+        "platform": info.platform,
+        "triangles": int(first.compiled.counts["triangles"][0]),
+        "size": experiment.variants[0].scene.render.size,
+        "rows": rows,
+        "ratios": ratios,
+    }

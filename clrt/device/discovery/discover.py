@@ -46,8 +46,9 @@ def find_devices(again: bool = False, preference: Preference | None = None) -> F
         named = [info for info, _ in _matching(found, preference.selector)]
         chosen = named[0] if len(named) == 1 and named[0].usable else None
     origin = preference.origin if preference else ""
-    return [(replace(info, chosen=info is chosen, why=_why(info, infos, chosen, origin)), device)
-            for info, device in found]
+    return [
+        (replace(info, chosen=info is chosen, why=_why(info, infos, chosen, origin)), device) for info, device in found
+    ]
 
 
 def devices() -> list[dict[str, Any]]:
@@ -57,8 +58,7 @@ def devices() -> list[dict[str, Any]]:
 
 def as_dict(info: DeviceInfo) -> dict[str, Any]:
     """Return the fields of a device; `check`, `bench` and `hardware` only if they are known."""
-    return {name: value for name, value in asdict(info).items()
-            if value or name not in ("check", "bench", "hardware")}
+    return {name: value for name, value in asdict(info).items() if value or name not in ("check", "bench", "hardware")}
 
 
 def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
@@ -83,17 +83,23 @@ def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
         selector, origin = preferred_device() or (None, "")
     asked = f"{selector!r}" + (f" ({origin})" if origin else "")
     matches = _matching(found, selector)
-    listing = "\n".join(f"  {info.index}  {info.id}  {info.name} ({info.platform}){_trouble(info)}"
-                        for info, _ in found)
+    listing = "\n".join(
+        f"  {info.index}  {info.id}  {info.name} ({info.platform}){_trouble(info)}" for info, _ in found
+    )
     if not matches and selector is None and any(info.failed for info, _ in found):
-        raise DeviceError(f"no usable device passed its check; `clrt devices` lists what failed. Update the driver and "
-                          f"run `clrt devices --check` again, or select a device to use it anyway:\n{listing}")
+        raise DeviceError(
+            f"no usable device passed its check; `clrt devices` lists what failed. Update the driver and "
+            f"run `clrt devices --check` again, or select a device to use it anyway:\n{listing}"
+        )
     if not matches and selector is None and any(info.usable for info, _ in found):
-        raise DeviceError("only a simulator, a thousand times as slow, is usable; select it to use it, or "
-                          f"install a driver (`clrt devices` shows why others are unusable):\n{listing}")
+        raise DeviceError(
+            "only a simulator, a thousand times as slow, is usable; select it to use it, or "
+            f"install a driver (`clrt devices` shows why others are unusable):\n{listing}"
+        )
     if not matches and selector is None:
-        raise DeviceError(f"no device is usable; `clrt devices` shows why and what to do:\n{listing}"
-                          + f"\n{no_room()}".rstrip())
+        raise DeviceError(
+            f"no device is usable; `clrt devices` shows why and what to do:\n{listing}" + f"\n{no_room()}".rstrip()
+        )
     if not matches:
         raise DeviceError(f"no usable device matches {asked}; there are:\n{listing}")
     if len(matches) > 1:
@@ -142,7 +148,7 @@ def _why(info: DeviceInfo, infos: list[DeviceInfo], chosen: DeviceInfo | None, o
         rivals = sum(other.usable and not other.failed for other in _real(infos))
         rank = "only one" if rivals <= 1 else "fastest measured" if info.bench else f"largest {info.type}"
         notes = [f"chosen because {origin} selects it, {speed}" if origin else f"chosen as the {rank}, {speed}"]
-    twin = next((other for other in infos[:info.index] if other.usable and _same_hardware(info, other)), None)
+    twin = next((other for other in infos[: info.index] if other.usable and _same_hardware(info, other)), None)
     if twin:
         notes.append(f"same hardware as device {twin.index}, through another platform")
     if info.translated:
@@ -190,8 +196,9 @@ def _matching(found: Found, selector: str | int | None) -> Found:
     """
     text = str(selector).strip().lower()
     if selector is None or text in ("cpu", "gpu"):
-        of_kind = [pair for pair in found
-                   if pair[0].usable and (pair[0].chosen if selector is None else pair[0].type == text)]
+        of_kind = [
+            pair for pair in found if pair[0].usable and (pair[0].chosen if selector is None else pair[0].type == text)
+        ]
         return sorted(of_kind, key=lambda pair: pair[0].failed)[:1]
     if text.isdigit():
         return [pair for pair in found if text in (str(pair[0].index), pair[0].id)]

@@ -28,11 +28,11 @@ def provide_cache_folders() -> None:
     own = f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}"
     folder = next(filter(_writable, [os.path.join(temporary, own), os.path.join(MEMORY, own)]), None)
     if folder is None:
-        try:    # another user took the names, or there is no room
+        try:  # another user took the names, or there is no room
             full = not _has_room(temporary) and _has_room(MEMORY)
             folder = tempfile.mkdtemp(prefix="clrt-cache-", dir=MEMORY if full else temporary)
         except OSError:
-            return    # drivers fail, and `no_room` says why
+            return  # drivers fail, and `no_room` says why
     if home_is_closed:
         os.environ["XDG_CACHE_HOME"] = folder
     if programs_are_closed:
@@ -45,8 +45,10 @@ def no_room() -> str:
     folders = dict.fromkeys([os.environ.get("POCL_CACHE_DIR") or home, _temporary(), MEMORY])
     if any(map(_has_room, folders)):
         return ""
-    return (f"no file of {ROOM >> 10} kB can be written in {', '.join(folders)}, and drivers need such files; free "
-            "some space, or name another folder with TMPDIR")
+    return (
+        f"no file of {ROOM >> 10} kB can be written in {', '.join(folders)}, and drivers need such files; free "
+        "some space, or name another folder with TMPDIR"
+    )
 
 
 def _writable(folder: str) -> bool:
@@ -74,7 +76,7 @@ def _temporary() -> str:
     try:
         return tempfile.gettempdir()
     except OSError:
-        os.environ["TMPDIR"] = tempfile.tempdir = MEMORY    # for child processes, too
+        os.environ["TMPDIR"] = tempfile.tempdir = MEMORY  # for child processes, too
         return MEMORY
 
 

@@ -50,7 +50,7 @@ def _probe(libraries: Sequence[str], limit: float, folder: str) -> list[str]:
 def _wait(children: Sequence[subprocess.Popen[str]], limit: float) -> None:
     """Wait until all children have ended, are idle after the limit, or have used the whole limit as CPU time each."""
     clock = AwakeClock()
-    busy = {child: (0.0, 0.0) for child in children}     # CPU time of each, and when it was last active
+    busy = {child: (0.0, 0.0) for child in children}  # CPU time of each, and when it was last active
     while busy:
         time.sleep(0.02)
         now = clock.look()

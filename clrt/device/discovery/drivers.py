@@ -21,8 +21,16 @@ import pyopencl as cl
 VENDORS = "/etc/OpenCL/vendors"
 #: Libraries to look for whether or not an .icd file names them, unless a variable says where drivers are.
 UNLISTED = ("libnvidia-opencl.so.1", "libamdocl64.so", "intel-opencl/libigdrcl.so")
-FOLDERS = (f"/usr/lib/{os.uname().machine}-linux-gnu" if hasattr(os, "uname") else "", "/usr/lib64", "/usr/lib",
-           "/usr/local/lib", "/usr/local/nvidia/lib64", "/usr/lib/wsl/lib", "/opt/rocm/lib", "/opt/rocm/opencl/lib")
+FOLDERS = (
+    f"/usr/lib/{os.uname().machine}-linux-gnu" if hasattr(os, "uname") else "",
+    "/usr/lib64",
+    "/usr/lib",
+    "/usr/local/lib",
+    "/usr/local/nvidia/lib64",
+    "/usr/lib/wsl/lib",
+    "/opt/rocm/lib",
+    "/opt/rocm/opencl/lib",
+)
 
 
 @dataclass(frozen=True)
@@ -42,11 +50,15 @@ def installed_drivers() -> list[Driver]:
     if named and not os.path.isdir(named):
         drivers = [_driver(named, "OCL_ICD_VENDORS")]
     else:
-        drivers = [*_listed(Path(named or VENDORS)), *_listed(Path(cl.__file__).parent / ".libs"),
-                   *(each for each in _listed(Path(sys.prefix) / "etc/OpenCL/vendors") if os.path.exists(each.library))]
+        drivers = [
+            *_listed(Path(named or VENDORS)),
+            *_listed(Path(cl.__file__).parent / ".libs"),
+            *(each for each in _listed(Path(sys.prefix) / "etc/OpenCL/vendors") if os.path.exists(each.library)),
+        ]
         drivers += [] if named else _unlisted()
-    drivers += [_driver(path, "OCL_ICD_FILENAMES")
-                for path in os.environ.get("OCL_ICD_FILENAMES", "").split(os.pathsep) if path]
+    drivers += [
+        _driver(path, "OCL_ICD_FILENAMES") for path in os.environ.get("OCL_ICD_FILENAMES", "").split(os.pathsep) if path
+    ]
     by_file = {os.path.realpath(driver.library): driver for driver in reversed(drivers)}
     return list(reversed(by_file.values()))
 

@@ -47,6 +47,7 @@ def _pci(device: cl.Device, extensions: list[str]) -> tuple[int, ...]:
 def _told(device: cl.Device, query: int, size: int) -> bytes:
     """Return the driver's answer to a query; empty if it fails or has another size."""
     answer, length = ctypes.create_string_buffer(size), ctypes.c_size_t()
-    error = library().clGetDeviceInfo(ctypes.c_void_p(device.int_ptr), ctypes.c_uint(query), ctypes.c_size_t(size),
-                                      answer, ctypes.byref(length))
+    error = library().clGetDeviceInfo(
+        ctypes.c_void_p(device.int_ptr), ctypes.c_uint(query), ctypes.c_size_t(size), answer, ctypes.byref(length)
+    )
     return answer.raw if not error and length.value == size else b""

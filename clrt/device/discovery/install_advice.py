@@ -13,7 +13,8 @@ DRIVERS = {
     ("win32", "amd64"): "install one with `pip install intel-opencl-rt msvc-runtime`",
     # pip's pyopencl for macOS is linked with Apple's framework, which loads no other drivers.
     ("darwin", ""): "pip's pyopencl supports only Apple's OpenCL; conda-forge's also supports PoCL: "
-                    "`conda install -c conda-forge pyopencl pocl`"}
+    "`conda install -c conda-forge pyopencl pocl`",
+}
 
 
 def no_device(system: str = sys.platform, machine: str = platform.machine()) -> str:

@@ -36,8 +36,10 @@ def load(libraries: Sequence[str]) -> list[cl.Platform]:
             with _variables(**dict.fromkeys(VARIABLES, folder) | {FILENAMES: None}):
                 return _platforms()
     except OSError as error:
-        raise DeviceError(f"cannot write a temporary file ({error.strerror}), which OpenCL's loader needs; free "
-                          "some space, or set TMPDIR to another folder") from error
+        raise DeviceError(
+            f"cannot write a temporary file ({error.strerror}), which OpenCL's loader needs; free "
+            "some space, or set TMPDIR to another folder"
+        ) from error
 
 
 def load_all(added: Sequence[str]) -> list[cl.Platform]:
@@ -49,7 +51,7 @@ def load_all(added: Sequence[str]) -> list[cl.Platform]:
 
 def library() -> ctypes.CDLL:
     """Return the ICD loader that pyopencl is linked with, for calls that pyopencl lacks or makes holding the GIL."""
-    if sys.platform == "win32":     # where a library does not export the symbols of those that it is linked with
+    if sys.platform == "win32":  # where a library does not export the symbols of those that it is linked with
         bundled = Path(cl.__file__).parents[1].glob("pyopencl.libs/opencl-*.dll")
         return ctypes.CDLL(next(map(str, bundled), "OpenCL.dll"))
     else:
@@ -66,8 +68,9 @@ def _platforms() -> list[cl.Platform]:
             loader, count = library(), ctypes.c_uint()
             loader.clGetPlatformIDs(0, None, ctypes.byref(count))
             for platform in cl.get_platforms():
-                loader.clGetDeviceIDs(ctypes.c_void_p(platform.int_ptr), ctypes.c_uint64(cl.device_type.ALL), 0, None,
-                                      ctypes.byref(count))
+                loader.clGetDeviceIDs(
+                    ctypes.c_void_p(platform.int_ptr), ctypes.c_uint64(cl.device_type.ALL), 0, None, ctypes.byref(count)
+                )
         return cl.get_platforms()
     except cl.Error:  # no platforms
         return []

@@ -63,8 +63,7 @@ def faults_of(drivers: list[Driver], again: bool = False) -> Faults:
             content = {"state": _state(driver), "fault": fault, "when": time.time()}
             cache_files.write_file(_name(driver), json.dumps(content).encode())
             if fault and not again:
-                log.warning("the OpenCL driver %s is ignored: %s; see `clrt devices`",
-                            driver.library, fault)
+                log.warning("the OpenCL driver %s is ignored: %s; see `clrt devices`", driver.library, fault)
     return {driver: fault or "" for driver, fault in faults.items()}
 
 

@@ -30,8 +30,9 @@ def preferred_device() -> Preference | None:
         content = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError, RuntimeError):
         if os.environ.get("CLRT_CONFIG"):
-            raise UsageError(f"{path}: CLRT_CONFIG names this file, which does not exist; create it or unset "
-                             "CLRT_CONFIG") from None
+            raise UsageError(
+                f"{path}: CLRT_CONFIG names this file, which does not exist; create it or unset CLRT_CONFIG"
+            ) from None
         return None
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror}); make it readable, or move it away") from error
@@ -39,7 +40,7 @@ def preferred_device() -> Preference | None:
     if device is None or device == "":
         return None
     if not isinstance(device, str | int) or isinstance(device, bool):
-        raise UsageError(f"{path}: device is {device!r}; write a number, a name in quotes, an id, \"cpu\" or \"gpu\"")
+        raise UsageError(f'{path}: device is {device!r}; write a number, a name in quotes, an id, "cpu" or "gpu"')
     return Preference(device, str(path))
 
 
@@ -58,7 +59,7 @@ def _settings(path: Path, content: bytes) -> dict[str, object]:
     try:
         settings = tomllib.loads(content.decode())
     except ValueError as error:
-        raise UsageError(f"{path}: is not valid TOML ({error}); write device = \"gpu\", or move it away") from error
+        raise UsageError(f'{path}: is not valid TOML ({error}); write device = "gpu", or move it away') from error
     if others := sorted(set(settings) - {"device"}):
         raise UsageError(f"{path}: {', '.join(others)} is unknown; the only key is device")
     return settings

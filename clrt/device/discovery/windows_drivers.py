@@ -41,5 +41,7 @@ def is_loaded(driver: Driver) -> bool:
 
 def not_loaded(driver: Driver) -> str:
     """Return why a driver is not loaded, and the remedy."""
-    return ("OpenCL's loader did not load it: in a process with administrator rights it loads only what the registry "
-            f'lists. Run clrt without them, or register it: reg add {KEY} /v "{driver.library}" /t REG_DWORD /d 0')
+    return (
+        "OpenCL's loader did not load it: in a process with administrator rights it loads only what the registry "
+        f'lists. Run clrt without them, or register it: reg add {KEY} /v "{driver.library}" /t REG_DWORD /d 0'
+    )

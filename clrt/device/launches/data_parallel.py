@@ -126,8 +126,9 @@ class DataParallel:
         """
         values = tuple(map(_scalar, arguments))
         with driver_errors():
-            most = self._kernel(name, values).get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE,
-                                                                  self.device.cl)
+            most = self._kernel(name, values).get_work_group_info(
+                cl.kernel_work_group_info.WORK_GROUP_SIZE, self.device.cl
+            )
         self._launch(name, 1, min(self._group, most), values)
 
     def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> None:

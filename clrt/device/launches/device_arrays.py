@@ -102,11 +102,12 @@ def room_for(device: Device | None, dtype: DTypeLike, size: int) -> DeviceArray 
     return empty_array(device, dtype, size) if device else np.zeros(size, dtype)
 
 
-def put(device: Device | None, array: DeviceArray | NDArray[Any], values: DeviceArray | NDArray[Any],
-        first: int = 0) -> None:
+def put(
+    device: Device | None, array: DeviceArray | NDArray[Any], values: DeviceArray | NDArray[Any], first: int = 0
+) -> None:
     """Overwrite the elements of `array` from index `first` on with `values`, as `DeviceArray.write` does."""
     if isinstance(array, DeviceArray):
         assert device is not None
         array.write(device, values, first)
     else:
-        array[first:first + len(values)] = values
+        array[first : first + len(values)] = values

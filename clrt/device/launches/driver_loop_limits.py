@@ -56,8 +56,10 @@ def measured_turns(device: Device) -> int | None:
     """Measure how many of TURNS iterations a loop runs: None if all, 0 if its result is wrong in another way."""
     kernel = make_kernel(device, build(device, turns_source()), "turns")
     number = np.full(1, 7, np.uint32)
-    given, made = (cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=number)
-                   for _ in range(2))
+    given, made = (
+        cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=number)
+        for _ in range(2)
+    )
     kernel.set_args(given, np.uint32(TURNS), made)
     cl.enqueue_nd_range_kernel(device.queue, kernel, (1,), (1,))
     cl.enqueue_copy(device.queue, number, made)

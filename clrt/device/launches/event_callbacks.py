@@ -18,6 +18,7 @@ _python_ends = Event()
 
 def when_complete(event: cl.Event, function: Callable[[], object]) -> None:
     """Have `function` called once the event is complete, or at once if it already is; never while Python shuts down."""
+
     def called(_: int) -> None:
         function()
 

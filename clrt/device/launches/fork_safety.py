@@ -14,8 +14,10 @@ def check_process() -> None:
     global _process
     _process = _process or os.getpid()
     if is_forked():
-        raise UsageError("this process was forked from one that had used OpenCL, which is not supported: start it with "
-                         "multiprocessing's spawn method, or use clrt only in child processes")
+        raise UsageError(
+            "this process was forked from one that had used OpenCL, which is not supported: start it with "
+            "multiprocessing's spawn method, or use clrt only in child processes"
+        )
 
 
 def is_forked() -> bool:

@@ -163,8 +163,10 @@ class Wait:
         if self._clock.look() > patience() and status != cl.command_execution_status.COMPLETE:
             note_hang()
             share_no_more()
-            raise HungError(f"the device has not finished a launch in {patience():g} s: its driver hangs, or it is "
-                            f"lost; if launches may take that long, set {VARIABLE} to more seconds")
+            raise HungError(
+                f"the device has not finished a launch in {patience():g} s: its driver hangs, or it is "
+                f"lost; if launches may take that long, set {VARIABLE} to more seconds"
+            )
         return bool(status == cl.command_execution_status.COMPLETE)
 
 

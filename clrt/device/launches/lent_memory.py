@@ -72,7 +72,7 @@ def lend(device: Device, array: NDArray[Any], access: int) -> LentBuffer:
     """Return a buffer that wraps the contiguous array, with `access` of mem_flags. The array must then not change."""
     buffer = LentBuffer(device.context, access | cl.mem_flags.USE_HOST_PTR, hostbuf=array)
     buffer.loan = _Loan(buffer, array, device.queue)
-    _lent[id(buffer.loan)] = buffer.loan    # before any command can use it, in case of an interrupt
+    _lent[id(buffer.loan)] = buffer.loan  # before any command can use it, in case of an interrupt
     return buffer
 
 
@@ -99,7 +99,7 @@ def settle() -> None:
     if is_forked():
         return
     for number, each in list(_lent.items()):
-        with suppress(cl.Error):    # the device was lost: keep the array
+        with suppress(cl.Error):  # the device was lost: keep the array
             if each.is_over():
                 _lent.pop(number, None)
 

@@ -25,8 +25,10 @@ def part_records(itemsize: int, part_bytes: int) -> int:
     """
     records = part_bytes // itemsize - OVERLAP
     if records < 1:
-        raise NoRoomError(f"buffers of {part_bytes} bytes are too small for this scene: {OVERLAP + 1} of its largest "
-                          f"records must fit; set {VARIABLE} to {(OVERLAP + 1) * itemsize} or more")
+        raise NoRoomError(
+            f"buffers of {part_bytes} bytes are too small for this scene: {OVERLAP + 1} of its largest "
+            f"records must fit; set {VARIABLE} to {(OVERLAP + 1) * itemsize} or more"
+        )
     return records
 
 
@@ -43,7 +45,7 @@ def parts(array: NDArray[Any], part_bytes: int | None) -> Iterator[NDArray[Any]]
     """Yield the parts of an array, none larger than `part_bytes`; the array itself if that is None."""
     own = max(1, len(array)) if part_bytes is None else part_records(array.itemsize, part_bytes)
     for first in range(0, max(1, len(array)), own):
-        yield array[first:first + own + (0 if part_bytes is None else OVERLAP)]
+        yield array[first : first + own + (0 if part_bytes is None else OVERLAP)]
 
 
 def part_count(array: Any, part_bytes: int | None) -> int:
@@ -58,9 +60,11 @@ def check_memory(info: DeviceInfo, needs: Mapping[str, int], parameter_bytes: in
     """
     check_room(info, needs)
     if parameter_bytes > most_parameter_bytes:
-        raise NoRoomError(f"{info.name}: its buffers are at most {size(info.max_alloc_bytes)}, and the scene of "
-                          f"{size(sum(needs.values()))} needs more of them than the about {most_parameter_bytes // 8} "
-                          f"that a kernel takes; use another --device or a smaller scene (or set {VARIABLE} to more)")
+        raise NoRoomError(
+            f"{info.name}: its buffers are at most {size(info.max_alloc_bytes)}, and the scene of "
+            f"{size(sum(needs.values()))} needs more of them than the about {most_parameter_bytes // 8} "
+            f"that a kernel takes; use another --device or a smaller scene (or set {VARIABLE} to more)"
+        )
 
 
 def check_room(info: DeviceInfo, needs: Mapping[str, int]) -> None:
@@ -69,16 +73,20 @@ def check_room(info: DeviceInfo, needs: Mapping[str, int]) -> None:
     if total > info.global_bytes:
         largest = sorted(needs, key=lambda name: -needs[name])[:4]
         told = ", ".join(f"{name} {size(needs[name])}" for name in largest)
-        raise NoRoomError(f"{info.name}: this render needs {size(total)} ({told}), and the device has "
-                          f"{size(info.global_bytes)}; use another --device, or smaller or fewer images and models")
+        raise NoRoomError(
+            f"{info.name}: this render needs {size(total)} ({told}), and the device has "
+            f"{size(info.global_bytes)}; use another --device, or smaller or fewer images and models"
+        )
 
 
 def check_host(film_bytes: int, width: int, height: int) -> None:
     """Raise NoRoomError if this machine has no room for a film and for the same size again of derived data."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 2 * film_bytes
     if 2 * film_bytes > memory:
-        raise NoRoomError(f"an image of {width}x{height} needs {size(2 * film_bytes)} of memory, and this machine has "
-                          f"{size(memory)}; render a smaller --size")
+        raise NoRoomError(
+            f"an image of {width}x{height} needs {size(2 * film_bytes)} of memory, and this machine has "
+            f"{size(memory)}; render a smaller --size"
+        )
 
 
 def size(count: int) -> str:

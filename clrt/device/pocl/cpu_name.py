@@ -22,9 +22,23 @@ import pyopencl as cl
 
 #: LLVM name → the /proc/cpuinfo flags of the instructions that its code generator may use, best first.
 PROCESSORS = {
-    "icelake-server": {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "avx512vbmi", "avx512_vbmi2",
-                       "avx512_vnni", "avx512_bitalg", "avx512_vpopcntdq", "avx512ifma", "gfni", "fma", "bmi2",
-                       "movbe"},
+    "icelake-server": {
+        "avx512f",
+        "avx512dq",
+        "avx512bw",
+        "avx512vl",
+        "avx512cd",
+        "avx512vbmi",
+        "avx512_vbmi2",
+        "avx512_vnni",
+        "avx512_bitalg",
+        "avx512_vpopcntdq",
+        "avx512ifma",
+        "gfni",
+        "fma",
+        "bmi2",
+        "movbe",
+    },
     "skylake-avx512": {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "fma", "bmi2", "movbe"},
     "haswell": {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe"},
     "nehalem": {"sse4_2", "popcnt"},
@@ -61,8 +75,11 @@ def name_processor(device: cl.Device) -> bool:
     if "LLVM 14" not in device.platform.version or not Path("/proc/self/mem").exists():
         return False
     flags = processor_flags()
-    found = [offset for offset, text, neighbour in _strings(device.int_ptr)
-             if is_misnamed(text, flags) and neighbour.startswith("x86_64")]
+    found = [
+        offset
+        for offset, text, neighbour in _strings(device.int_ptr)
+        if is_misnamed(text, flags) and neighbour.startswith("x86_64")
+    ]
     if len(found) != 1:
         return False
     _names.append(ctypes.create_string_buffer(best_processor(flags).encode()))
@@ -89,5 +106,8 @@ def _strings(address: int) -> list[tuple[int, str, str]]:
                 return ""
 
         texts = [text(word) for word in words]
-    return [(8 * i, texts[i], texts[i - 1] if texts[i - 1].startswith("x86_64") else texts[i + 1])
-            for i in range(1, len(texts) - 1) if texts[i]]
+    return [
+        (8 * i, texts[i], texts[i - 1] if texts[i - 1].startswith("x86_64") else texts[i + 1])
+        for i in range(1, len(texts) - 1)
+        if texts[i]
+    ]

@@ -32,7 +32,7 @@ def kept_programs() -> Path:
 def remove_damaged() -> int:
     """Remove damaged programs, which are then compiled again when needed; return how many there were."""
     removed = 0
-    with suppress(OSError, RuntimeError):   # the folder may be unreadable, or there may be no home
+    with suppress(OSError, RuntimeError):  # the folder may be unreadable, or there may be no home
         for program in chain(kept_programs().glob("[A-Z][A-Z]/*"), kept_programs().glob("*_*")):
             if not all(map(_is_whole, program.rglob("*"))):
                 shutil.rmtree(program, ignore_errors=True)

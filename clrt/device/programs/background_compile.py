@@ -36,6 +36,8 @@ def in_background(where: str, work: Callable[[], T]) -> T:
     if not wait_awake(done, SLOW):
         _log.warning("%s has been compiling a kernel for %g s; the limit is %g s", where, SLOW, LIMIT)
         if not wait_awake(done, LIMIT - SLOW):
-            raise KernelError(f"{where} has been compiling a kernel for {LIMIT:g} s: its compiler hangs, or is far too "
-                              "slow; update the driver, or choose another device (`clrt devices`)")
+            raise KernelError(
+                f"{where} has been compiling a kernel for {LIMIT:g} s: its compiler hangs, or is far too "
+                "slow; update the driver, or choose another device (`clrt devices`)"
+            )
     return result()

@@ -33,7 +33,7 @@ def name_kernels(source: str, ending: str) -> str:
 
 def find_bitcode(ending: str) -> bytes | None:
     """Return the bitcode of the program just built whose kernel names end with `ending`, or None if it is not found."""
-    with suppress(OSError, RuntimeError):   # the folder may be unreadable, or there may be no home
+    with suppress(OSError, RuntimeError):  # the folder may be unreadable, or there may be no home
         for used in heapq.nlargest(SEARCHED, kept_programs().glob("[A-Z][A-Z]/*/last_accessed"), _when):
             bitcode = used.with_name("program.bc").read_bytes()
             if ending.encode() in bitcode:  # symbols are plain bytes

@@ -16,9 +16,16 @@ from pathlib import Path
 #: File names of scenes' reference images (bench/convergence/reference.py).
 REFERENCES = "reference-*.npz"
 #: File name patterns by kind of content.
-KINDS = {"programs": "*.bin", "reference pictures": REFERENCES, "probes of drivers": "*.driver.json",
-         "checks of devices": "*.check.json", "speeds of devices": "*.bench.json", "loop limits": "*.loops.json",
-         "logs": "last-*.log", "unfinished files": "unfinished-*"}
+KINDS = {
+    "programs": "*.bin",
+    "reference pictures": REFERENCES,
+    "probes of drivers": "*.driver.json",
+    "checks of devices": "*.check.json",
+    "speeds of devices": "*.bench.json",
+    "loop limits": "*.loops.json",
+    "logs": "last-*.log",
+    "unfinished files": "unfinished-*",
+}
 
 
 def cache_folder() -> Path:

@@ -11,16 +11,29 @@ from pathlib import Path
 from typing import IO
 
 
-def start_child(module: str, argument: str, output: IO[bytes] | int, errors: IO[bytes] | int,
-                given: IO[bytes] | int = subprocess.DEVNULL, **variables: str) -> subprocess.Popen[str]:
+def start_child(
+    module: str,
+    argument: str,
+    output: IO[bytes] | int,
+    errors: IO[bytes] | int,
+    given: IO[bytes] | int = subprocess.DEVNULL,
+    **variables: str,
+) -> subprocess.Popen[str]:
     """Start `python -m module argument` with this process's module search path, wherever it is started.
 
     given: its standard input. `variables` are added to its environment.
     """
     path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
     environment = {**os.environ, "PYTHONPATH": path, **variables}
-    return subprocess.Popen([sys.executable, "-P", "-m", module, argument], stdin=given, stdout=output, stderr=errors,
-                            text=True, encoding="utf-8", env=environment)
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", module, argument],
+        stdin=given,
+        stdout=output,
+        stderr=errors,
+        text=True,
+        encoding="utf-8",
+        env=environment,
+    )
 
 
 def end_child(child: subprocess.Popen[str]) -> None:

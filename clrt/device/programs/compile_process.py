@@ -28,13 +28,13 @@ LARGE = 1 << 25
 
 def compile_aside(device_id: str, source: str, options: list[str], seconds: float) -> None:
     """Compile `source` in the compile process, within `seconds`. Errors are ignored: compiling here reports them."""
-    give_back()     # packing's freed memory: both processes run at the same time for a while
+    give_back()  # packing's freed memory: both processes run at the same time for a while
     with suppress(OSError), tempfile.TemporaryFile() as given:
         given.write(json.dumps([source, options]).encode())
         given.seek(0)
         child = start_child(__name__, device_id, subprocess.DEVNULL, subprocess.DEVNULL, given=given)
         end = partial(end_child, child)
-        atexit.register(end)    # this process may exit in the meantime
+        atexit.register(end)  # this process may exit in the meantime
         try:
             with suppress(subprocess.TimeoutExpired):
                 child.wait(seconds)

@@ -26,15 +26,19 @@ def scene_struct(buffers: Buffers, part_bytes: int | None = None) -> str:
     if part_bytes is not None:
         counts = {name: part_count(array, part_bytes) for name, (_, array) in buffers.items()}
         members = [f"{member}[{count}]" for member, count in zip(members, counts.values())]
-        parameters = [f"global const {c_type} *{name}_{i}" for name, (c_type, _) in buffers.items()
-                      for i in range(counts[name])]
+        parameters = [
+            f"global const {c_type} *{name}_{i}" for name, (c_type, _) in buffers.items() for i in range(counts[name])
+        ]
         names = [f"{{{', '.join(f'{name}_{i}' for i in range(count))}}}" for name, count in counts.items()]
         lines.append(defines({"PART_BYTES": part_bytes, "PART_OVERLAP": OVERLAP}))
-    return "\n".join([
-        *lines,
-        f"typedef struct {{ {' '.join(member + ';' for member in [*members, 'Counts counts'])} }} Scene;",
-        f"#define SCENE_PARAMETERS {', '.join([*parameters, 'const Counts counts'])}",
-        f"#define SCENE_ARGUMENTS {{{', '.join([*names, 'counts'])}}}"])
+    return "\n".join(
+        [
+            *lines,
+            f"typedef struct {{ {' '.join(member + ';' for member in [*members, 'Counts counts'])} }} Scene;",
+            f"#define SCENE_PARAMETERS {', '.join([*parameters, 'const Counts counts'])}",
+            f"#define SCENE_ARGUMENTS {{{', '.join([*names, 'counts'])}}}",
+        ]
+    )
 
 
 def type_list(macro: str, types: Iterable[tuple[str, int]]) -> str:

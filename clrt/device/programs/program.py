@@ -144,7 +144,7 @@ def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
     try:
         try:
             return cl.Kernel(built.program, name + built.ending)
-        except Error:   # pyopencl's cache of kernel invokers is damaged, or its disk is full
+        except Error:  # pyopencl's cache of kernel invokers is damaged, or its disk is full
             cl._PYOPENCL_NO_CACHE = True
             return cl.Kernel(built.program, name + built.ending)
     except cl.Error as error:
@@ -156,8 +156,14 @@ def program_key(device: Device, source: str) -> str:
 
     It includes the processor: machines may share a cache, and processors of the same name may differ in features.
     """
-    identity = [source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver,
-                best_processor(processor_flags())]
+    identity = [
+        source,
+        *OPTIONS,
+        device.info.id,
+        device.info.platform_version,
+        device.info.driver,
+        best_processor(processor_flags()),
+    ]
     return hashlib.sha256("\n".join(identity).encode()).hexdigest()
 
 
@@ -179,7 +185,7 @@ def _built(device: Device, key: str, source: str, ending: str, aside: bool = Fal
     program, other = _compile(device, source), None
     if device.is_pocl:
         binary = find_bitcode(ending) or b"" if ending else b""
-        other = _from_binary(device, binary)    # use it now, too, so that its kernels are compiled only once
+        other = _from_binary(device, binary)  # use it now, too, so that its kernels are compiled only once
         write_binary(key, binary if other else b"")
     else:
         binaries: list[bytes] = program.get_info(cl.program_info.BINARIES)  # type: ignore[assignment]

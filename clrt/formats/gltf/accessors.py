@@ -58,9 +58,11 @@ class GltfData:
         data = self._buffer(view.buffer, f"bufferView {index}")
         end = view.byteOffset + view.byteLength
         if end > len(data):
-            raise SceneError(f"bufferView {index}: ends at byte {end}, but buffer {view.buffer} has {len(data)}; "
-                             "export the file again")
-        return data[view.byteOffset:end]
+            raise SceneError(
+                f"bufferView {index}: ends at byte {end}, but buffer {view.buffer} has {len(data)}; "
+                "export the file again"
+            )
+        return data[view.byteOffset : end]
 
     def array(self, index: int, kind: str, user: str) -> Array:
         """Return the values of an accessor of the type `kind`, (count, components): float32 if they are floats or
@@ -72,12 +74,19 @@ class GltfData:
         if index in self.decoded:
             values = self.decoded[index]
             if values.shape[1] != size:
-                raise SceneError(f"{user}: accessor {index} has {values.shape[1]} components, not {size}; "
-                                 "export the file again")
+                raise SceneError(
+                    f"{user}: accessor {index} has {values.shape[1]} components, not {size}; export the file again"
+                )
         elif accessor.bufferView is not None:
             stride = entry(self.document.bufferViews, accessor.bufferView, "bufferView", f"accessor {index}").byteStride
-            values = self._strided(accessor.bufferView, accessor.byteOffset, accessor.componentType,
-                                   (accessor.count, size), stride, f"accessor {index}")
+            values = self._strided(
+                accessor.bufferView,
+                accessor.byteOffset,
+                accessor.componentType,
+                (accessor.count, size),
+                stride,
+                f"accessor {index}",
+            )
         elif accessor.count > MOST_ZEROS:
             raise SceneError(f"accessor {index}: {accessor.count} elements without a bufferView; export the file again")
         else:
@@ -86,30 +95,45 @@ class GltfData:
             values = self._replaced(values, accessor.sparse, accessor, f"accessor {index}")
         return _normalised(values) if accessor.normalized else values
 
-    def _strided(self, view: int, offset: int, component: int, shape: tuple[int, int], stride: int | None,
-                 user: str) -> Array:
+    def _strided(
+        self, view: int, offset: int, component: int, shape: tuple[int, int], stride: int | None, user: str
+    ) -> Array:
         """Return (count, components) values from a buffer view, each element `stride` bytes after the last."""
         data = self.view(view, user)
         dtype = np.dtype(DTYPES[component])
         step = stride or shape[1] * dtype.itemsize
         end = offset + step * (shape[0] - 1) + shape[1] * dtype.itemsize
         if end > len(data):
-            raise SceneError(f"{user}: needs {end} bytes of bufferView {view}, which has {len(data)}; "
-                             "export the file again")
+            raise SceneError(
+                f"{user}: needs {end} bytes of bufferView {view}, which has {len(data)}; export the file again"
+            )
         return np.ndarray(shape, dtype, data.data, offset, (step, dtype.itemsize))
 
-    def _replaced(self, values: Array, sparse: Sparse, accessor: Accessor, user: str,
-                  ) -> Array:
+    def _replaced(
+        self,
+        values: Array,
+        sparse: Sparse,
+        accessor: Accessor,
+        user: str,
+    ) -> Array:
         """Return a copy of `values` with the elements that `sparse` replaces."""
         where, new = sparse.indices, sparse.values
-        indices = self._strided(where.bufferView, where.byteOffset, where.componentType, (sparse.count, 1), None,
-                                f"{user} (sparse indices)")[:, 0].astype(np.int64)
+        indices = self._strided(
+            where.bufferView, where.byteOffset, where.componentType, (sparse.count, 1), None, f"{user} (sparse indices)"
+        )[:, 0].astype(np.int64)
         if indices.max() >= len(values):
-            raise SceneError(f"{user}: its sparse index {indices.max()} is beyond its {len(values)} elements; "
-                             "export the file again")
+            raise SceneError(
+                f"{user}: its sparse index {indices.max()} is beyond its {len(values)} elements; export the file again"
+            )
         values = values.copy()
-        values[indices] = self._strided(new.bufferView, new.byteOffset, accessor.componentType,
-                                        (sparse.count, values.shape[1]), None, f"{user} (sparse values)")
+        values[indices] = self._strided(
+            new.bufferView,
+            new.byteOffset,
+            accessor.componentType,
+            (sparse.count, values.shape[1]),
+            None,
+            f"{user} (sparse values)",
+        )
         return values
 
     def _buffer(self, index: int, user: str) -> Bytes:
@@ -122,9 +146,11 @@ class GltfData:
             else:
                 raise SceneError(f"buffer {index}: has neither a URI nor a binary chunk; export the file again")
             if len(data) < buffer.byteLength:
-                raise SceneError(f"buffer {index}: has {len(data)} of its {buffer.byteLength} bytes; "
-                                 "the file is truncated, copy it again")
-            self._buffers[index] = np.frombuffer(data, np.uint8)[:buffer.byteLength]
+                raise SceneError(
+                    f"buffer {index}: has {len(data)} of its {buffer.byteLength} bytes; "
+                    "the file is truncated, copy it again"
+                )
+            self._buffers[index] = np.frombuffer(data, np.uint8)[: buffer.byteLength]
         return self._buffers[index]
 
 
@@ -141,7 +167,7 @@ def split_glb(content: bytes) -> tuple[bytes, bytes | None]:
         size, kind = struct.unpack_from("<I4s", content, position)
         if position + 8 + size > length:
             raise SceneError(f"its chunk at byte {position} is longer than the file; copy it again")
-        chunks.setdefault(kind, content[position + 8:position + 8 + size])
+        chunks.setdefault(kind, content[position + 8 : position + 8 + size])
         position += 8 + size
     if b"JSON" not in chunks:
         raise SceneError("contains no JSON chunk; export it again")

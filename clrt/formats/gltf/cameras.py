@@ -19,8 +19,9 @@ from . import schema as gltf
 log = logging.getLogger(__name__)
 
 
-def read_cameras(path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix]],
-                 middle: NDArray[np.float64]) -> dict[str, Camera]:
+def read_cameras(
+    path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix]], middle: NDArray[np.float64]
+) -> dict[str, Camera]:
     """Return the cameras of the scene by name: that of the node, else the camera's own, else "camera N".
 
     A number is appended to a name in use. The look_at point is as far away as `middle`, (3,). A camera without a view

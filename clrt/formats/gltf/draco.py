@@ -22,20 +22,27 @@ def decompress(data: GltfData, primitive: gltf.Primitive, user: str) -> None:
         position = gltf.entry(data.document.accessors, primitive.attributes["POSITION"], "accessor", user)
         if position.bufferView is not None and position.bufferView != compressed.bufferView:
             return
-        raise SceneError(f"{user}: is compressed with Draco, whose decoder is not installed; "
-                         "pip install DracoPy, or export without compression")
+        raise SceneError(
+            f"{user}: is compressed with Draco, whose decoder is not installed; "
+            "pip install DracoPy, or export without compression"
+        )
     try:
         arrays, _ = decode("draco", data.view(compressed.bufferView, user).tobytes(), ".drc")
     except SceneError as error:
         raise SceneError(f"{user}: its Draco data cannot be decoded: {error}; export it again") from None
-    found = {primitive.attributes[name]: arrays.get(f"attribute {number}")
-             for name, number in compressed.attributes.items() if name in primitive.attributes}
+    found = {
+        primitive.attributes[name]: arrays.get(f"attribute {number}")
+        for name, number in compressed.attributes.items()
+        if name in primitive.attributes
+    }
     if primitive.indices is not None:
         found[primitive.indices] = arrays["faces"].reshape(-1, 1)
     for accessor, values in found.items():
         described = gltf.entry(data.document.accessors, accessor, "accessor", user)
         if values is None or len(values) != described.count:
             count = "none" if values is None else len(values)
-            raise SceneError(f"{user}: accessor {accessor} has {described.count} elements, but the Draco data {count}; "
-                             "export it again")
+            raise SceneError(
+                f"{user}: accessor {accessor} has {described.count} elements, but the Draco data {count}; "
+                "export it again"
+            )
         data.decoded[accessor] = values

@@ -14,8 +14,14 @@ import numpy as np
 from ...scene.model import Mesh
 
 _FLOAT, _UINT = 5126, 5125
-_ATTRIBUTES = {"vertices": "POSITION", "normals": "NORMAL", "uv": "TEXCOORD_0", "uv1": "TEXCOORD_1",
-               "colors": "COLOR_0", "tangents": "TANGENT"}
+_ATTRIBUTES = {
+    "vertices": "POSITION",
+    "normals": "NORMAL",
+    "uv": "TEXCOORD_0",
+    "uv1": "TEXCOORD_1",
+    "colors": "COLOR_0",
+    "tangents": "TANGENT",
+}
 _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
@@ -29,19 +35,35 @@ def mesh_glb(mesh: Mesh) -> bytes:
         nonlocal binary
         data = np.ascontiguousarray(array).tobytes()
         views.append({"buffer": 0, "byteOffset": len(binary), "byteLength": len(data)})
-        accessors.append({"bufferView": len(views) - 1, "componentType": kind, "count": len(array),
-                          "type": _TYPES[1 if array.ndim == 1 else array.shape[1]], **more})
+        accessors.append(
+            {
+                "bufferView": len(views) - 1,
+                "componentType": kind,
+                "count": len(array),
+                "type": _TYPES[1 if array.ndim == 1 else array.shape[1]],
+                **more,
+            }
+        )
         binary += data
         return len(accessors) - 1
 
     bounds = {"min": mesh.vertices.min(axis=0).tolist(), "max": mesh.vertices.max(axis=0).tolist()}
     arrays = {name: array for name in _ATTRIBUTES if (array := getattr(mesh, name)) is not None}
-    attributes = {_ATTRIBUTES[name]: add(array.astype("<f4"), _FLOAT, **(bounds if name == "vertices" else {}))
-                  for name, array in arrays.items()}
+    attributes = {
+        _ATTRIBUTES[name]: add(array.astype("<f4"), _FLOAT, **(bounds if name == "vertices" else {}))
+        for name, array in arrays.items()
+    }
     primitive = {"attributes": attributes, "indices": add(mesh.faces.astype("<u4").ravel(), _UINT)}
-    document = {"asset": {"version": "2.0", "generator": "clrt"}, "scene": 0, "scenes": [{"nodes": [0]}],
-                "nodes": [{"mesh": 0, "name": mesh.name}], "meshes": [{"name": mesh.name, "primitives": [primitive]}],
-                "buffers": [{"byteLength": len(binary)}], "bufferViews": views, "accessors": accessors}
+    document = {
+        "asset": {"version": "2.0", "generator": "clrt"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": mesh.name}],
+        "meshes": [{"name": mesh.name, "primitives": [primitive]}],
+        "buffers": [{"byteLength": len(binary)}],
+        "bufferViews": views,
+        "accessors": accessors,
+    }
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary

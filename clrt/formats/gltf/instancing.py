@@ -29,20 +29,27 @@ def matrices(data: GltfData, node: gltf.Node, matrix: Matrix) -> list[Matrix]:
         return [matrix]
     name = f'node "{node.name or ""}" (EXT_mesh_gpu_instancing)'
     kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
-    given = {key: data.array(own.attributes[key], kind, name).astype(np.float64)
-             for key, kind in kinds.items() if key in own.attributes}
+    given = {
+        key: data.array(own.attributes[key], kind, name).astype(np.float64)
+        for key, kind in kinds.items()
+        if key in own.attributes
+    }
     counts = {len(values) for values in given.values()}
     if len(counts) != 1 or max(counts) > MOST:
-        raise SceneError(f"{name}: has {' and '.join(map(str, sorted(counts))) or 'no'} transforms; write the same "
-                         f"number of TRANSLATION, ROTATION and SCALE, at most {MOST}")
+        raise SceneError(
+            f"{name}: has {' and '.join(map(str, sorted(counts))) or 'no'} transforms; write the same "
+            f"number of TRANSLATION, ROTATION and SCALE, at most {MOST}"
+        )
     count = counts.pop()
     local = np.tile(np.eye(4), (count, 1, 1))
     local[:, :3, 3] = given.get("TRANSLATION", 0.0)
     local[:, :3, :3] = turns(given["ROTATION"]) if "ROTATION" in given else np.eye(3)
     local[:, :3, :3] *= given.get("SCALE", np.ones((count, 3)))[:, None]
     if not np.isfinite(local).all():
-        raise SceneError(f"{name}: instance {int(np.argmin(np.isfinite(local).all(axis=(1, 2))))} has a transform that "
-                         "is not finite; export the file again")
+        raise SceneError(
+            f"{name}: instance {int(np.argmin(np.isfinite(local).all(axis=(1, 2))))} has a transform that "
+            "is not finite; export the file again"
+        )
     return list(matrix @ local)
 
 

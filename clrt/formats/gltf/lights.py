@@ -30,11 +30,16 @@ def read_lights(document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix
         if source.type == "point":
             yield PointLight(position=(x, y, z), intensity=(red, green, blue), range=reach)
         elif not (to_x or to_y or to_z):
-            continue    # scale 0 leaves no direction
+            continue  # scale 0 leaves no direction
         elif source.type == "directional":
             yield DirectionalLight(direction=(to_x, to_y, to_z), irradiance=(red, green, blue))
         else:
             outer = min(degrees(source.spot.outerConeAngle), 90.0)
-            yield SpotLight(position=(x, y, z), direction=(to_x, to_y, to_z), intensity=(red, green, blue),
-                            inner_degrees=min(degrees(source.spot.innerConeAngle), WIDEST_INNER * outer),
-                            outer_degrees=outer, range=reach)
+            yield SpotLight(
+                position=(x, y, z),
+                direction=(to_x, to_y, to_z),
+                intensity=(red, green, blue),
+                inner_degrees=min(degrees(source.spot.innerConeAngle), WIDEST_INNER * outer),
+                outer_degrees=outer,
+                range=reach,
+            )

@@ -40,8 +40,9 @@ class Materials:
         #: Features that had an effect in the file, but are not rendered, by the material's name.
         self.unused: dict[str, list[str]] = {}
 
-    def material(self, primitive: gltf.Primitive, user: str, uv: list[NDArray[np.float32] | None],
-                 faces: NDArray[np.int32]) -> Material:
+    def material(
+        self, primitive: gltf.Primitive, user: str, uv: list[NDArray[np.float32] | None], faces: NDArray[np.int32]
+    ) -> Material:
         """Return the primitive's material with all values clamped to their limits, or the specification's default if it
         has none. uv, faces: its texture coordinates, both sets, and triangles.
 
@@ -58,13 +59,17 @@ class Materials:
             color=_colored(_cut(pbr.baseColorFactor[:3]), base, pbr.baseColorTexture, GREY),
             metallic=_numbered(_unit(pbr.metallicFactor), gloss, "blue"),
             roughness=_numbered(_unit(pbr.roughnessFactor), gloss, "green"),
-            emission=self._emission(source, primitive, user), double_sided=source.doubleSided,
-            **self._layers(source.extensions, primitive, user))
+            emission=self._emission(source, primitive, user),
+            double_sided=source.doubleSided,
+            **self._layers(source.extensions, primitive, user),
+        )
         made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
         coverage = _coverage(source, base, "COLOR_0" in primitive.attributes)
         solid = glass(source.extensions, made, uv, faces)
-        lost = {"alphaMode": coverage.get("opacity", 1.0) != 1, **{
-            layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR")}}
+        lost = {
+            "alphaMode": coverage.get("opacity", 1.0) != 1,
+            **{layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR")},
+        }
         if solid is None:
             volume = source.extensions.KHR_materials_volume.thicknessFactor > 0
             lost = {"volume": volume and made.transmission != 0 and made.metallic != 1}
@@ -89,20 +94,23 @@ class Materials:
             "ior": ior,
             "clearcoat": number(coat.clearcoatFactor, coat.clearcoatTexture, "red"),
             "clearcoat_roughness": number(coat.clearcoatRoughnessFactor, coat.clearcoatRoughnessTexture, "green"),
-            "clearcoat_normal_map": self._bend(coat.clearcoatNormalTexture if coat.clearcoatFactor > 0 else None,
-                                               primitive, user),
+            "clearcoat_normal_map": self._bend(
+                coat.clearcoatNormalTexture if coat.clearcoatFactor > 0 else None, primitive, user
+            ),
             "sheen_color": color(_cut(sheen.sheenColorFactor), sheen.sheenColorTexture),
             "sheen_roughness": number(sheen.sheenRoughnessFactor, sheen.sheenRoughnessTexture, "alpha"),
             "specular": number(specular.specularFactor, specular.specularTexture, "alpha"),
             "specular_color": color((red, green, blue), specular.specularColorTexture),
-            "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red")}
+            "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red"),
+        }
 
     def _bend(self, info: looks.NormalTextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
         texture = self._texture(info, primitive, user)
         return None if texture is None or info is None else replace(texture, factor=max(info.scale, 0.0))
 
-    def _emission(self, source: looks.Material, primitive: gltf.Primitive,
-                  user: str) -> tuple[float, float, float] | Texture:
+    def _emission(
+        self, source: looks.Material, primitive: gltf.Primitive, user: str
+    ) -> tuple[float, float, float] | Texture:
         strength = max(source.extensions.KHR_materials_emissive_strength.emissiveStrength, 0.0)
         red, green, blue = (strength * max(value, 0.0) for value in source.emissiveFactor)
         glow = self._texture(source.emissiveTexture, primitive, user) if max(red, green, blue) else None
@@ -127,17 +135,26 @@ class Materials:
         if texture.sampler is not None:
             sampler = gltf.entry(self._data.document.samplers, texture.sampler, "sampler", f"texture {info.index}")
         wrap = WRAPS[sampler.wrapS], WRAPS[sampler.wrapT]
-        return Texture(picture=picture, uv_set=uv_set, offset=placed.offset, scale=placed.scale, wrap=wrap,
-                       rotation_degrees=math.degrees(placed.rotation),
-                       filter="nearest" if sampler.magFilter == NEAREST else "linear")
+        return Texture(
+            picture=picture,
+            uv_set=uv_set,
+            offset=placed.offset,
+            scale=placed.scale,
+            wrap=wrap,
+            rotation_degrees=math.degrees(placed.rotation),
+            filter="nearest" if sampler.magFilter == NEAREST else "linear",
+        )
 
     def _picture(self, index: int, user: str) -> Picture | None:
         """Return an image; None, with a warning, if it cannot be read."""
         if index not in self._pictures:
             image = gltf.entry(self._data.document.images, index, "image", user)
             try:
-                content = (self._data.resource(image.uri or "", user) if image.bufferView is None
-                           else self._data.view(image.bufferView, user).tobytes())
+                content = (
+                    self._data.resource(image.uri or "", user)
+                    if image.bufferView is None
+                    else self._data.view(image.bufferView, user).tobytes()
+                )
                 self._pictures[index] = Picture(read_texels(content, f"image {index}"), image.name or f"image {index}")
             except SceneError as error:
                 log.warning("%s: a texture is left out: %s", self._data.path, error)
@@ -154,13 +171,14 @@ def _coverage(source: looks.Material, base: Texture | None, vertex_colors: bool)
     opacity = most if opacity == 1 else opacity
     if source.alphaMode == "BLEND":
         return {"opacity": opacity}
-    if source.alphaCutoff > 1:    # no alpha reaches it (specification 3.9.4)
+    if source.alphaCutoff > 1:  # no alpha reaches it (specification 3.9.4)
         return {"opacity": 0.0}
     return {"opacity": opacity, "alpha_cutoff": most * _unit(source.alphaCutoff)}
 
 
-def _colored(factor: tuple[float, float, float], texture: Texture | None, info: looks.TextureInfo | None,
-             missing: float) -> tuple[float, float, float] | Texture:
+def _colored(
+    factor: tuple[float, float, float], texture: Texture | None, info: looks.TextureInfo | None, missing: float
+) -> tuple[float, float, float] | Texture:
     """Return a color times its texture, or times `missing` if the texture is unavailable."""
     if texture is not None:
         return replace(texture, factor=factor)
@@ -182,7 +200,7 @@ def _ior(ior: float) -> tuple[float, float]:
 
 def _reflectance(ior: float) -> float:
     """Return the reflectance at normal incidence; 1 for glTF's 0."""
-    return ((ior - 1) / (ior + 1))**2
+    return ((ior - 1) / (ior + 1)) ** 2
 
 
 def _positive(color: tuple[float, float, float]) -> tuple[float, float, float]:

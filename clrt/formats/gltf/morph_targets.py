@@ -20,8 +20,9 @@ def weights_of(node: gltf.Node, mesh: gltf.Mesh) -> tuple[float, ...]:
     return tuple(weights) if any(weights) else ()
 
 
-def morphed(data: GltfData, primitive: gltf.Primitive, key: str, values: Floats, weights: Sequence[float],
-            user: str) -> Floats:
+def morphed(
+    data: GltfData, primitive: gltf.Primitive, key: str, values: Floats, weights: Sequence[float], user: str
+) -> Floats:
     """Return an attribute's values (n, k) with the targets' weighted displacements added to the first three components.
 
     Raises SceneError if the numbers of weights and targets, or of displacements and values, differ.
@@ -29,14 +30,16 @@ def morphed(data: GltfData, primitive: gltf.Primitive, key: str, values: Floats,
     if not weights:
         return values
     if len(weights) != len(primitive.targets):
-        raise SceneError(f"{user}: has {len(primitive.targets)} morph targets, but {len(weights)} weights; export it "
-                         "again")
+        raise SceneError(
+            f"{user}: has {len(primitive.targets)} morph targets, but {len(weights)} weights; export it again"
+        )
     moved = values.astype(np.float64)
     for weight, target in zip(weights, primitive.targets):
         if weight and key in target:
             moves = data.array(target[key], "VEC3", f"{user}, morph target")
             if len(moves) != len(values):
-                raise SceneError(f"{user}: a morph target has {len(moves)} of {key} for {len(values)} vertices; export "
-                                 "it again")
+                raise SceneError(
+                    f"{user}: a morph target has {len(moves)} of {key} for {len(values)} vertices; export it again"
+                )
             moved[:, :3] += weight * np.where(np.isfinite(moves), moves, 0)
     return moved.astype(np.float32)

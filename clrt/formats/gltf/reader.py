@@ -58,8 +58,12 @@ def _read(path: Path, normals: Normals) -> Model:
         raise SceneError(problems)
     _warn_of_left_out(path, data.document, materials.unused)
     middle = np.mean(bounds(meshes, instances), axis=0)
-    return Model(meshes=meshes, instances=instances, cameras=read_cameras(path, data.document, nodes, middle),
-                 lights=list(read_lights(data.document, nodes)))
+    return Model(
+        meshes=meshes,
+        instances=instances,
+        cameras=read_cameras(path, data.document, nodes, middle),
+        lights=list(read_lights(data.document, nodes)),
+    )
 
 
 def _nodes(document: gltf.Document) -> Iterator[Placed]:
@@ -94,8 +98,9 @@ def _local(node: gltf.Node, index: int) -> Matrix:
     return translation(node.translation) @ quaternion(*node.rotation) @ scaling(node.scale)
 
 
-def _places(data: GltfData, materials: Materials, nodes: list[Placed],
-            normals: Normals) -> Iterator[tuple[Mesh, Matrix]]:
+def _places(
+    data: GltfData, materials: Materials, nodes: list[Placed], normals: Normals
+) -> Iterator[tuple[Mesh, Matrix]]:
     """Yield the meshes of all nodes with their matrices; a mesh is read once per set of morph weights."""
     read: dict[tuple[int, tuple[float, ...]], list[Mesh]] = {}
     for node, matrix in nodes:
@@ -107,8 +112,9 @@ def _places(data: GltfData, materials: Materials, nodes: list[Placed],
             yield from ((mesh, place) for place in matrices(data, node, matrix) for mesh in read[key])
 
 
-def _primitives(data: GltfData, materials: Materials, index: int, weights: Sequence[float],
-                normals: Normals) -> Iterator[Mesh]:
+def _primitives(
+    data: GltfData, materials: Materials, index: int, weights: Sequence[float], normals: Normals
+) -> Iterator[Mesh]:
     """Yield a mesh's primitives with triangles, in its own frame, with the weighted morph targets applied."""
     source = gltf.entry(data.document.meshes, index, "mesh", "a node")
     for number, primitive in enumerate(source.primitives):
@@ -126,25 +132,37 @@ def _primitives(data: GltfData, materials: Materials, index: int, weights: Seque
         problems = index_problems(corners, len(vertices), where)
         if problems:
             raise SceneError(problems)
-        normal, tangent, uv, uv1 = (_attribute(data, primitive, key, kind, len(vertices), where) for key, kind in [
-            ("NORMAL", "VEC3"), ("TANGENT", "VEC4"), ("TEXCOORD_0", "VEC2"), ("TEXCOORD_1", "VEC2")])
+        normal, tangent, uv, uv1 = (
+            _attribute(data, primitive, key, kind, len(vertices), where)
+            for key, kind in [("NORMAL", "VEC3"), ("TANGENT", "VEC4"), ("TEXCOORD_0", "VEC2"), ("TEXCOORD_1", "VEC2")]
+        )
         faces = corners.astype(np.int32)
         vertices = morphed(data, primitive, "POSITION", vertices, weights, where)
-        normal, tangent = (None if values is None else morphed(data, primitive, key, values, weights, where)
-                           for key, values in [("NORMAL", normal), ("TANGENT", tangent)])
-        yield Mesh(vertices, faces, materials.material(primitive, where, [uv, uv1], faces),
-                   choose_normals(normals, vertices, faces, normal), name, uv=uv, uv1=uv1,
-                   colors=_colors(data, primitive, len(vertices), where),
-                   tangents=tangent if normals == "file" and normal is not None else None,
-                   material_name="" if primitive.material is None else materials.names[primitive.material])
+        normal, tangent = (
+            None if values is None else morphed(data, primitive, key, values, weights, where)
+            for key, values in [("NORMAL", normal), ("TANGENT", tangent)]
+        )
+        yield Mesh(
+            vertices,
+            faces,
+            materials.material(primitive, where, [uv, uv1], faces),
+            choose_normals(normals, vertices, faces, normal),
+            name,
+            uv=uv,
+            uv1=uv1,
+            colors=_colors(data, primitive, len(vertices), where),
+            tangents=tangent if normals == "file" and normal is not None else None,
+            material_name="" if primitive.material is None else materials.names[primitive.material],
+        )
 
 
 def _vectors(data: GltfData, accessor: int, user: str) -> NDArray[np.float32]:
     return np.ascontiguousarray(data.array(accessor, "VEC3", user), np.float32)
 
 
-def _attribute(data: GltfData, primitive: gltf.Primitive, key: str, kind: str, n: int,
-               user: str) -> NDArray[np.float32] | None:
+def _attribute(
+    data: GltfData, primitive: gltf.Primitive, key: str, kind: str, n: int, user: str
+) -> NDArray[np.float32] | None:
     """Return the values (n, k) of an attribute of `n` vertices; those not finite become 0, except in normals."""
     if key not in primitive.attributes:
         return None
@@ -171,8 +189,10 @@ def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> ND
     else:
         indices = data.array(primitive.indices, "SCALAR", user)
         if not np.issubdtype(indices.dtype, np.unsignedinteger):
-            raise SceneError(f"{user}: its indices, accessor {primitive.indices}, are {indices.dtype}; "
-                             "they must be unsigned integers")
+            raise SceneError(
+                f"{user}: its indices, accessor {primitive.indices}, are {indices.dtype}; "
+                "they must be unsigned integers"
+            )
         order = indices[:, 0].astype(np.int64)
     if primitive.mode == TRIANGLES or primitive.indices in data.decoded:
         if len(order) % 3:

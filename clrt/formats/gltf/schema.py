@@ -20,10 +20,19 @@ NonNegative = Annotated[float, Field(ge=0)]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
 #: Supported extensions.
-EXTENSIONS = frozenset(f"KHR_materials_{name}" for name in (
-    "clearcoat", "emissive_strength", "ior", "sheen", "specular", "transmission", "volume")) | frozenset({
-        "EXT_mesh_gpu_instancing", "EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual",
-        "KHR_mesh_quantization", "KHR_texture_transform"})
+EXTENSIONS = frozenset(
+    f"KHR_materials_{name}"
+    for name in ("clearcoat", "emissive_strength", "ior", "sheen", "specular", "transmission", "volume")
+) | frozenset(
+    {
+        "EXT_mesh_gpu_instancing",
+        "EXT_texture_webp",
+        "KHR_draco_mesh_compression",
+        "KHR_lights_punctual",
+        "KHR_mesh_quantization",
+        "KHR_texture_transform",
+    }
+)
 
 
 class Asset(Part):
@@ -188,8 +197,9 @@ def parse_document(text: bytes) -> Document:
         document = Document.model_validate_json(text)
     except ValidationError as error:
         details = error.errors(include_url=False)
-        raise SceneError([f"{_path(detail['loc'])}: {detail['msg']}; export the file again" for detail in details[:12]]
-                         ) from None
+        raise SceneError(
+            [f"{_path(detail['loc'])}: {detail['msg']}; export the file again" for detail in details[:12]]
+        ) from None
     if not document.asset.version.startswith("2."):
         raise SceneError(f'asset.version is "{document.asset.version}"; only glTF 2 is supported, export it as 2.0')
     missing = sorted(set(document.extensionsRequired) - EXTENSIONS)

@@ -13,8 +13,12 @@ from .material_schema import MaterialExtensions
 NOISE = 0.05
 
 
-def glass(extensions: MaterialExtensions, made: MetallicRoughness, uv: list[NDArray[np.float32] | None],
-          faces: NDArray[np.int32]) -> Dielectric | None:
+def glass(
+    extensions: MaterialExtensions,
+    made: MetallicRoughness,
+    uv: list[NDArray[np.float32] | None],
+    faces: NDArray[np.int32],
+) -> Dielectric | None:
     """Return the material as a solid, or None unless it has a volume, transmits fully and is not metallic anywhere on
     these faces, (m, 3); `uv`: the two sets of texture coordinates, (n, 2). Only the faces' texels count, since a
     texture is often an atlas of several materials."""
@@ -23,9 +27,16 @@ def glass(extensions: MaterialExtensions, made: MetallicRoughness, uv: list[NDAr
         return None
     distance = volume.attenuationDistance
     red, green, blue = (float(np.clip(value, 0, 1)) for value in volume.attenuationColor)
-    return Dielectric(color=made.color, ior=made.ior, roughness=made.roughness, emission=made.emission,
-                      normal_map=made.normal_map, double_sided=made.double_sided, attenuation_color=(red, green, blue),
-                      attenuation_distance=distance if distance is not None and distance > 0 else None)
+    return Dielectric(
+        color=made.color,
+        ior=made.ior,
+        roughness=made.roughness,
+        emission=made.emission,
+        normal_map=made.normal_map,
+        double_sided=made.double_sided,
+        attenuation_color=(red, green, blue),
+        attenuation_distance=distance if distance is not None and distance > 0 else None,
+    )
 
 
 def _largest(value: float | Texture, uv: list[NDArray[np.float32] | None], faces: NDArray[np.int32]) -> float:
@@ -37,8 +48,9 @@ def _largest(value: float | Texture, uv: list[NDArray[np.float32] | None], faces
         return 1.0
     middles = coordinates[faces].astype(np.float64).mean(axis=1)
     placed = np.column_stack([middles, np.ones(len(middles))]) @ value.to_picture.T
-    texels = value.picture.texels[_rows(placed[:, 1], value.wrap[1], value.picture, 0),
-                                  _rows(placed[:, 0], value.wrap[0], value.picture, 1)]
+    texels = value.picture.texels[
+        _rows(placed[:, 1], value.wrap[1], value.picture, 0), _rows(placed[:, 0], value.wrap[0], value.picture, 1)
+    ]
     channel = ("red", "green", "blue", "alpha").index(value.channel)
     return float(value.factor * texels[:, channel].max(initial=0) / 255)
 

@@ -46,8 +46,9 @@ def decode(kind: str, source: Path | bytes, suffix: str = "") -> tuple[Arrays, d
             file.write_bytes(source)
             return decode(kind, file)
     except OSError as error:
-        raise SceneError("the system cannot provide a process or a temporary file for the decoder "
-                         f"({error.strerror or error})") from error
+        raise SceneError(
+            f"the system cannot provide a process or a temporary file for the decoder ({error.strerror or error})"
+        ) from error
 
 
 def _decoded(kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
@@ -78,8 +79,11 @@ class _Process:
         self.owner = os.getpid()
         self._popen = subprocess.Popen(
             [sys.executable, "-P", "-m", "clrt.formats.images.decoder_process"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"})
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"},
+        )
         assert self._popen.stdin and self._popen.stdout
         self._requests, self._replies = self._popen.stdin, self._popen.stdout
 

@@ -50,8 +50,11 @@ def picture(file: str) -> Found:
     pixels = buffer.get_pixels(kind) if buffer.read(0, 0, True, kind) else None
     if pixels is None:
         raise ValueError(_complaint(buffer))
-    return {"pixels": pixels}, {"channels": list(spec.channelnames), "whole": [spec.full_width, spec.full_height],
-                                "cropped": buffer.roi != buffer.roi_full}
+    return {"pixels": pixels}, {
+        "channels": list(spec.channelnames),
+        "whole": [spec.full_width, spec.full_height],
+        "cropped": buffer.roi != buffer.roi_full,
+    }
 
 
 def _complaint(buffer: Any) -> str:
@@ -69,8 +72,10 @@ def draco(file: str) -> Found:
     with open(file, "rb") as content:
         mesh = DracoPy.decode(content.read())
     faces = np.asarray(mesh.faces, np.uint32).reshape(-1, 3)
-    return {"faces": faces, **{f"attribute {attribute['unique_id']}": np.asarray(attribute["data"])
-                               for attribute in mesh.attributes}}, {}
+    return {
+        "faces": faces,
+        **{f"attribute {attribute['unique_id']}": np.asarray(attribute["data"]) for attribute in mesh.attributes},
+    }, {}
 
 
 KINDS: dict[str, Callable[[str], Found]] = {"picture": picture, "draco": draco}

@@ -80,8 +80,10 @@ def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], list[str]]:
     if facts["cropped"]:
         height, width = pixels.shape[:2]
         full_width, full_height = facts["whole"]
-        raise SceneError(f"{name}: the file contains {width}x{height} pixels of a {full_width}x{full_height} image; "
-                         "save it uncropped")
+        raise SceneError(
+            f"{name}: the file contains {width}x{height} pixels of a {full_width}x{full_height} image; "
+            "save it uncropped"
+        )
     return pixels, facts["channels"]
 
 

@@ -30,7 +30,7 @@ def read_radiance(path: Path) -> NDArray[np.float32] | None:
     rows = np.empty((height, 4, width), np.uint8)
     start, mark = header.end(), bytes((2, 2, width >> 8, width & 255))
     for row in rows:
-        if content[start:start + 4] != mark:
+        if content[start : start + 4] != mark:
             return None
         planes, start = _row(content, start + 4, 4 * width)
         if planes is None:

@@ -39,8 +39,11 @@ def environment(plugin: Plugin) -> Environment:
         return Environment(color=rgb(plugin.color("radiance", 1.0), emitted=True))
     plugin.used.add("mis_compensation")
     image = rows_at_middles(read_picture(Path(plugin.value("filename", str, ""))))
-    return Environment(image=image, strength=plugin.value("scale", float, 1.0),
-                       rotation_degrees=_turn(plugin, plugin.transform("to_world")))
+    return Environment(
+        image=image,
+        strength=plugin.value("scale", float, 1.0),
+        rotation_degrees=_turn(plugin, plugin.transform("to_world")),
+    )
 
 
 def _turn(plugin: Plugin, to_world: Doubles) -> float:
@@ -48,8 +51,11 @@ def _turn(plugin: Plugin, to_world: Doubles) -> float:
     angle = atan2(to_world[0, 2], to_world[0, 0])
     c, s = np.cos(angle), np.sin(angle)
     if np.abs(to_world[:3, :3] - [[c, 0, s], [0, 1, 0], [-s, 0, c]]).max() > TURN:
-        plugin.refuse("is rotated about an axis other than y", "rotate the scene and its camera so that y is up",
-                      "envmap rotated about x or z")
+        plugin.refuse(
+            "is rotated about an axis other than y",
+            "rotate the scene and its camera so that y is up",
+            "envmap rotated about x or z",
+        )
     return degrees(angle)
 
 

@@ -77,15 +77,19 @@ class MaterialReader:
             self.differences.append(f"{plugin.where}: normal map that shadows diffuse reflection, and nothing else")
         normals = self._textures.normals(plugin, "normalmap")
         if not np.allclose(normals.image_axes, np.eye(2)):
-            self.differences.append(f"{plugin.where}: a normal map is oriented by its image, rotated by to_uv; in "
-                                    "Mitsuba by u")
+            self.differences.append(
+                f"{plugin.where}: a normal map is oriented by its image, rotated by to_uv; in Mitsuba by u"
+            )
         return look._replace(material=replace(look.material, normal_map=normals))
 
     def _blend(self, plugin: Plugin) -> ShapeMaterial:
         """Blend the colors of two untextured diffuse BSDFs by a number or an attribute."""
         weight = self._textures.number(plugin, "weight", 0.5)
-        colors = [look.material.color for look in map(self.look, plugin.all("bsdf"))
-                  if type(look.material) is Diffuse and look == ShapeMaterial(Diffuse(color=look.material.color))]
+        colors = [
+            look.material.color
+            for look in map(self.look, plugin.all("bsdf"))
+            if type(look.material) is Diffuse and look == ShapeMaterial(Diffuse(color=look.material.color))
+        ]
         if len(colors) != 2 or isinstance(weight, Texture) or any(isinstance(each, Texture) for each in colors):
             plugin.refuse("blends anything but two uniform diffuse BSDFs", "write one BSDF", "blendbsdf")
         low, high = (each for each in colors if not isinstance(each, Texture))
@@ -100,8 +104,9 @@ class MaterialReader:
         _white(plugin, "specular_reflectance")
         color = self._textures.color(plugin, "specular_transmittance", 1.0)
         roughness = self._roughness(plugin) if rough else 0.0
-        return ShapeMaterial(Dielectric(ior=ior, color=color, thin=thin, roughness=roughness,
-                                        multiple_scattering=not rough))    # Mitsuba's models single scattering only
+        return ShapeMaterial(
+            Dielectric(ior=ior, color=color, thin=thin, roughness=roughness, multiple_scattering=not rough)
+        )  # Mitsuba's models single scattering only
 
     def _conductor(self, plugin: Plugin) -> ShapeMaterial:
         name = plugin.value("material", str, "" if {"eta", "k"} & {*plugin.values} else "none")
@@ -111,8 +116,9 @@ class MaterialReader:
         if color != (1.0, 1.0, 1.0):
             plugin.refuse("specular_reflectance is not 1", "leave it out", "specular_reflectance")
         if name and name not in METALS:
-            plugin.refuse(f'material "{name}" is unknown', f"write eta and k, or one of {', '.join(METALS)}",
-                          f"metal {name}")
+            plugin.refuse(
+                f'material "{name}" is unknown', f"write eta and k, or one of {', '.join(METALS)}", f"metal {name}"
+            )
         eta, k = METALS[name] if name else (rgb(plugin.color("eta", 0.0)), rgb(plugin.color("k", 1.0)))
         if plugin.kind == "roughconductor":
             return ShapeMaterial(Conductor(eta=eta, k=k, roughness=self._roughness(plugin)))
@@ -124,14 +130,21 @@ class MaterialReader:
         plugin.value("sample_visible", bool, True)
         distribution = plugin.value("distribution", str, "beckmann")
         if distribution != "ggx":
-            plugin.refuse(f'distribution "{distribution}" is not supported', 'write "ggx"',
-                          f"{plugin.kind}, {distribution}")
-        names = ("alpha_u", "alpha_v") if {"alpha_u", "alpha_v"} & {*plugin.values, *dict(plugin.children)} else (
-            "alpha", "alpha")
+            plugin.refuse(
+                f'distribution "{distribution}" is not supported', 'write "ggx"', f"{plugin.kind}, {distribution}"
+            )
+        names = (
+            ("alpha_u", "alpha_v")
+            if {"alpha_u", "alpha_v"} & {*plugin.values, *dict(plugin.children)}
+            else ("alpha", "alpha")
+        )
         alpha, other = (self._textures.number(plugin, name, 0.1) for name in names)
         if isinstance(alpha, (Texture, Attribute)) or alpha != other:
-            plugin.refuse("alpha is a texture or differs in u and v", "write one number for alpha",
-                          f"{plugin.kind}, {'anisotropic' if alpha != other else 'textured alpha'}")
+            plugin.refuse(
+                "alpha is a texture or differs in u and v",
+                "write one number for alpha",
+                f"{plugin.kind}, {'anisotropic' if alpha != other else 'textured alpha'}",
+            )
         if alpha > NEARLY_SMOOTH:
             self.differences.append(f"{plugin.where}: the height-correlated Smith term, Mitsuba's is separable")
         return sqrt(alpha)
@@ -152,8 +165,9 @@ def _index(plugin: Plugin, name: str, default: str) -> float:
     if isinstance(value, (int, float)):
         return float(value)
     if not isinstance(value, str) or value.lower() not in DIELECTRICS:
-        raise SceneError(f'{plugin.where}: {name} "{value}" is unknown; write a number or one of '
-                         f"{', '.join(DIELECTRICS)}")
+        raise SceneError(
+            f'{plugin.where}: {name} "{value}" is unknown; write a number or one of {", ".join(DIELECTRICS)}'
+        )
     return DIELECTRICS[value.lower()]
 
 
@@ -164,10 +178,15 @@ def _white(plugin: Plugin, name: str) -> None:
 
 def absorbing(material: Material, medium: Plugin) -> Material:
     """Return glass with a medium inside that absorbs and does not scatter."""
-    if not isinstance(material, Dielectric) or material.thin or medium.kind != "homogeneous" or any(
-            rgb(medium.color("albedo", 0.75))):
-        medium.refuse(f"is a {medium.kind} medium that scatters, or is not inside glass", "leave it out",
-                      f"{medium.kind} medium")
+    if (
+        not isinstance(material, Dielectric)
+        or material.thin
+        or medium.kind != "homogeneous"
+        or any(rgb(medium.color("albedo", 0.75)))
+    ):
+        medium.refuse(
+            f"is a {medium.kind} medium that scatters, or is not inside glass", "leave it out", f"{medium.kind} medium"
+        )
     rates = [rate * medium.value("scale", float, 1.0) for rate in rgb(medium.color("sigma_t", 1.0))]
     if not (most := max(rates)):
         return material
@@ -176,8 +195,14 @@ def absorbing(material: Material, medium: Plugin) -> Material:
 
 
 BSDFS: dict[str, Callable[[Any, Plugin], ShapeMaterial]] = {
-    "diffuse": MaterialReader._diffuse, "twosided": MaterialReader._twosided, "mask": MaterialReader._mask,
-    "normalmap": MaterialReader._normalmap, "blendbsdf": MaterialReader._blend,
-    "dielectric": MaterialReader._dielectric, "thindielectric": MaterialReader._dielectric,
-    "roughdielectric": MaterialReader._dielectric, "conductor": MaterialReader._conductor,
-    "roughconductor": MaterialReader._conductor}
+    "diffuse": MaterialReader._diffuse,
+    "twosided": MaterialReader._twosided,
+    "mask": MaterialReader._mask,
+    "normalmap": MaterialReader._normalmap,
+    "blendbsdf": MaterialReader._blend,
+    "dielectric": MaterialReader._dielectric,
+    "thindielectric": MaterialReader._dielectric,
+    "roughdielectric": MaterialReader._dielectric,
+    "conductor": MaterialReader._conductor,
+    "roughconductor": MaterialReader._conductor,
+}

@@ -26,8 +26,14 @@ Part = TypeVar("Part")
 
 #: Integrators that estimate the same image, by clrt's; those in WRAPPERS are unwrapped.
 INTEGRATORS: dict[str, Integrator] = {
-    "path": "path", "prb": "path", "ptracer": "path", "volpath": "path", "volpathmis": "path", "prbvolpath": "path",
-    "direct": "direct"}
+    "path": "path",
+    "prb": "path",
+    "ptracer": "path",
+    "volpath": "path",
+    "volpathmis": "path",
+    "prbvolpath": "path",
+    "direct": "direct",
+}
 WRAPPERS = ("moment", "aov")
 FILTERS: dict[str, Filter] = {"box": "box", "tent": "tent", "gaussian": "gaussian"}
 #: Default of Mitsuba's camera, and the diagonal in mm of the film that focal_length refers to.
@@ -37,8 +43,20 @@ ENDLESS = 1024
 #: Tolerance for a camera's axes to be orthogonal and equally long.
 ODD = 1e-5
 #: Ignored parameters, which affect how Mitsuba computes the image, not the image.
-IMMATERIAL = {"rr_depth", "near_clip", "far_clip", "pixel_format", "component_format", "file_format", "banner",
-              "compensate", "samples_per_pass", "emitter_samples", "bsdf_samples", "shading_samples"}
+IMMATERIAL = {
+    "rr_depth",
+    "near_clip",
+    "far_clip",
+    "pixel_format",
+    "component_format",
+    "file_format",
+    "banner",
+    "compensate",
+    "samples_per_pass",
+    "emitter_samples",
+    "bsdf_samples",
+    "shading_samples",
+}
 
 
 class MitsubaScene(NamedTuple):
@@ -89,9 +107,16 @@ class _Reader:
             raise UnsupportedError(self._problems, self._features)
         if self._problems:
             raise SceneError(self._problems)
-        scene = Scene(meshes=_of(parts, Mesh), spheres=_of(parts, Sphere), instances=_of(parts, Instance),
-                      lights=[each for each in lights if each], environment=next(filter(None, skies), Environment()),
-                      camera=camera, render=settings, name=name)
+        scene = Scene(
+            meshes=_of(parts, Mesh),
+            spheres=_of(parts, Sphere),
+            instances=_of(parts, Instance),
+            lights=[each for each in lights if each],
+            environment=next(filter(None, skies), Environment()),
+            camera=camera,
+            render=settings,
+            name=name,
+        )
         return MitsubaScene(scene, self._materials.differences, self._shapes.missing)
 
     def _parts(self, plugin: Plugin) -> list[Mesh | Sphere | Instance]:
@@ -114,8 +139,12 @@ class _Reader:
         """Note the parameters of plugins in use that were not read."""
         for plugin in _in_use(root):
             for name in plugin.unread():
-                self._note(UnsupportedError(f'{plugin.where}: "{name}" is not supported; leave it out',
-                                            [f"{plugin.tag} {plugin.kind}, {name}"]))
+                self._note(
+                    UnsupportedError(
+                        f'{plugin.where}: "{name}" is not supported; leave it out',
+                        [f"{plugin.tag} {plugin.kind}, {name}"],
+                    )
+                )
 
 
 def _in_use(root: Plugin) -> Iterator[Plugin]:
@@ -141,10 +170,16 @@ def _film(sensor: Plugin) -> RenderSettings:
         film.used |= IMMATERIAL
         for rfilter in film.all("rfilter"):
             kind = rfilter.kind
-            if kind not in FILTERS or rfilter.value("stddev", float, 0.5) != 0.5 or rfilter.value(
-                    "radius", float, 1.0) != 1:
-                rfilter.refuse(f'filter "{kind}" is not supported like this',
-                               "write box, tent or gaussian without parameters", f"rfilter {kind}")
+            if (
+                kind not in FILTERS
+                or rfilter.value("stddev", float, 0.5) != 0.5
+                or rfilter.value("radius", float, 1.0) != 1
+            ):
+                rfilter.refuse(
+                    f'filter "{kind}" is not supported like this',
+                    "write box, tent or gaussian without parameters",
+                    f"rfilter {kind}",
+                )
     return RenderSettings(size=size, spp=spp, filter=FILTERS[kind])
 
 
@@ -176,18 +211,29 @@ def _camera(plugin: Plugin, size: tuple[int, int]) -> Camera:
     if plugin.kind == "orthographic":
         return replace(camera, projection="orthographic", view_height=2 * lengths[0] / aspect)
     radius = plugin.value("aperture_radius", float, 0.0)
-    return replace(camera, fov_degrees=_vertical_fov(plugin, aspect), aperture_radius=radius,
-                   focus_distance=distance if radius else None)
+    return replace(
+        camera,
+        fov_degrees=_vertical_fov(plugin, aspect),
+        aperture_radius=radius,
+        focus_distance=distance if radius else None,
+    )
 
 
 def _lengths(plugin: Plugin, to_world: Doubles) -> tuple[float, float, float]:
     """Return the lengths of a sensor's axes; these must be orthogonal and not mirror or stretch the image."""
     axes = to_world[:3, :3]
     x, y, z = np.linalg.norm(axes, axis=0).tolist()
-    if min(x, y, z) == 0 or np.abs((axes / (x, y, z)).T @ (axes / (x, y, z)) - np.eye(3)).max() > ODD or (
-            abs(x - y) > ODD * x) or np.linalg.det(axes) < 0:
-        plugin.refuse("its to_world mirrors, shears or stretches the image",
-                      "only rotate, translate and scale uniformly", "sensor that mirrors or stretches")
+    if (
+        min(x, y, z) == 0
+        or np.abs((axes / (x, y, z)).T @ (axes / (x, y, z)) - np.eye(3)).max() > ODD
+        or (abs(x - y) > ODD * x)
+        or np.linalg.det(axes) < 0
+    ):
+        plugin.refuse(
+            "its to_world mirrors, shears or stretches the image",
+            "only rotate, translate and scale uniformly",
+            "sensor that mirrors or stretches",
+        )
     return x, y, z
 
 

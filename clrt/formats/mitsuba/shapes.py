@@ -24,7 +24,12 @@ from .values import Doubles
 from .xml import Plugin, UnsupportedError
 
 PRIMITIVES: dict[str, Callable[[], Mesh]] = {
-    "rectangle": rectangle, "cube": cube, "disk": disk, "cylinder": cylinder, "sphere": sphere}
+    "rectangle": rectangle,
+    "cube": cube,
+    "disk": disk,
+    "cylinder": cylinder,
+    "sphere": sphere,
+}
 FILES = ("obj", "ply")
 #: Tolerance for a transform to be a rotation, translation and uniform scale.
 UNEVEN = 1e-5
@@ -146,8 +151,9 @@ def _between(plugin: Plugin) -> Doubles:
     sign = 1.0 if z >= 0 else -1.0
     a = -1 / (sign + z)
     frame = np.eye(4)
-    frame[:3] = np.column_stack([(1 + sign * x * x * a, sign * x * y * a, -sign * x), (x * y * a, sign + y * y * a, -y),
-                                 (x, y, z), start])
+    frame[:3] = np.column_stack(
+        [(1 + sign * x * x * a, sign * x * y * a, -sign * x), (x * y * a, sign + y * y * a, -y), (x, y, z), start]
+    )
     return frame @ np.diag([radius, radius, float(np.linalg.norm(along)), 1.0])
 
 
@@ -164,8 +170,9 @@ def _sphere(to_world: Doubles, look: ShapeMaterial, name: str) -> Sphere | None:
 
 def _turned(mesh: Mesh) -> Mesh:
     """Return the mesh turned inside out."""
-    return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]),
-                   normals=None if mesh.normals is None else -mesh.normals)
+    return replace(
+        mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]), normals=None if mesh.normals is None else -mesh.normals
+    )
 
 
 def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attributes]]:
@@ -209,10 +216,12 @@ def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
     if problems := index_problems(faces, len(vertices), f'mesh "{path.stem}"'):
         raise SceneError([f"{path}: {problem}" for problem in problems])
     uv = next((found for pair in ("uv", "st") if (found := columns(*pair)) is not None), None)
-    mesh = Mesh(vertices, faces.astype(np.int32), name=path.stem,
-                normals=columns("nx", "ny", "nz"), uv=uv)
-    attributes = {f"{prefix}_{name}": values for prefix, table in (("vertex", vertex), ("face", face))
-                  for name, values in _attributes(table).items()}
+    mesh = Mesh(vertices, faces.astype(np.int32), name=path.stem, normals=columns("nx", "ny", "nz"), uv=uv)
+    attributes = {
+        f"{prefix}_{name}": values
+        for prefix, table in (("vertex", vertex), ("face", face))
+        for name, values in _attributes(table).items()
+    }
     return mesh, attributes
 
 
@@ -223,8 +232,10 @@ def _attributes(table: np.ndarray[tuple[int], np.dtype[np.void]]) -> dict[str, F
         name, _, place = column.rpartition("_")
         if name and place.isdigit() or name and place in "rgb":
             groups.setdefault(name, []).append(column)
-    return {name: np.column_stack([table[column] for column in columns]).astype(np.float32)
-            for name, columns in groups.items()}
+    return {
+        name: np.column_stack([table[column] for column in columns]).astype(np.float32)
+        for name, columns in groups.items()
+    }
 
 
 def _dressed(mesh: Mesh, look: ShapeMaterial, attributes: Attributes, plugin: Plugin) -> Mesh:
@@ -236,12 +247,19 @@ def _dressed(mesh: Mesh, look: ShapeMaterial, attributes: Attributes, plugin: Pl
         return mesh
     name, low, high = look.attribute
     if name not in attributes:
-        raise SceneError(f'{plugin.where}: has no attribute "{name}"; the file has '
-                         f"{', '.join(sorted(attributes)) or 'none'}")
+        raise SceneError(
+            f'{plugin.where}: has no attribute "{name}"; the file has {", ".join(sorted(attributes)) or "none"}'
+        )
     colors = (np.array(low) + attributes[name] * np.subtract(high, low)).clip(0, 1).astype(np.float32)
     if name.startswith("vertex_"):
         return replace(mesh, colors=colors)
     corners = mesh.faces.ravel()
     normals, uv = (None if array is None else array[corners] for array in (mesh.normals, mesh.uv))
-    return replace(mesh, vertices=mesh.vertices[corners], faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
-                   colors=np.repeat(colors, 3, axis=0), normals=normals, uv=uv)
+    return replace(
+        mesh,
+        vertices=mesh.vertices[corners],
+        faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
+        colors=np.repeat(colors, 3, axis=0),
+        normals=normals,
+        uv=uv,
+    )

@@ -75,8 +75,11 @@ class TextureReader:
             plugin.refuse_kind("bitmap, checkerboard or mesh_attribute")
         raw = plugin.value("raw", bool, False)
         if raw != (use == "normal") and use != "number":
-            plugin.refuse(f"is {'raw' if raw else 'not raw'}", f"write raw = {str(not raw).lower()}, for a {use}",
-                          f"bitmap, raw = {str(raw).lower()}, for a {use}")
+            plugin.refuse(
+                f"is {'raw' if raw else 'not raw'}",
+                f"write raw = {str(not raw).lower()}, for a {use}",
+                f"bitmap, raw = {str(raw).lower()}, for a {use}",
+            )
         plugin.used |= {"format", "accel"}  # these affect only how Mitsuba stores the texels
         path = plugin.value("filename", str, "")
         place = _placed(plugin, plugin.transform("to_uv"))
@@ -100,8 +103,9 @@ class TextureReader:
 
     def _checkerboard(self, plugin: Plugin, *, encoded: bool) -> Texture:
         """Return 2x2 texels, with factors that make the brighter color exact and the other as close as 8 bits allow."""
-        first, second = (rgb(plugin.color(name, value), bounded=True)
-                         for name, value in (("color0", 0.4), ("color1", 0.2)))
+        first, second = (
+            rgb(plugin.color(name, value), bounded=True) for name, value in (("color0", 0.4), ("color1", 0.2))
+        )
         if not encoded:  # Mitsuba 3 swaps the two for numbers
             first, second = second, first
         texels = np.full((2, 2, 4), 255, np.uint8)
@@ -137,5 +141,8 @@ def _placed(plugin: Plugin, to_uv: Doubles) -> dict[str, Any]:
         plugin.refuse("its to_uv shears", "only rotate, scale and translate", "to_uv that shears")
     angle = atan2(-matrix[1, 0], matrix[0, 0])
     height = float(np.linalg.det(matrix)) / columns[0] if columns[0] else columns[1]
-    return {"offset": (float(to_uv[0, 3]), float(to_uv[1, 3])), "scale": (columns[0], height),
-            "rotation_degrees": degrees(angle)}
+    return {
+        "offset": (float(to_uv[0, 3]), float(to_uv[1, 3])),
+        "scale": (columns[0], height),
+        "rotation_degrees": degrees(angle),
+    }

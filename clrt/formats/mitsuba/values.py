@@ -65,7 +65,8 @@ def color(text: str) -> Color:
     """Parse three numbers, one for grey, or a hexadecimal sRGB color such as #ff8000."""
     if text.strip().startswith("#"):
         from ..images.image_reader import linear_from_srgb
-        encoded = np.array([int(text.strip()[i:i + 2], 16) for i in (1, 3, 5)], np.float32)
+
+        encoded = np.array([int(text.strip()[i : i + 2], 16) for i in (1, 3, 5)], np.float32)
         red, green, blue = linear_from_srgb(encoded / np.float32(255)).tolist()
         return Color((red, green, blue))
     values = numbers(text)
@@ -141,13 +142,20 @@ def _matrix(attributes: Attributes) -> Doubles:
 STEPS: dict[str, Callable[[Attributes], Doubles]] = {
     "translate": lambda attributes: translation(vector(attributes)),
     "scale": lambda attributes: scaling(vector(attributes, missing=1.0)),
-    "rotate": _rotate, "lookat": _look_at, "matrix": _matrix}
+    "rotate": _rotate,
+    "lookat": _look_at,
+    "matrix": _matrix,
+}
 
 Value = bool | int | float | str | Color | Spectrum | tuple[float, float, float] | Doubles
 _READERS: dict[str, tuple[Callable[[str], Value], str]] = {
-    "float": (lambda text: float(numbers(text)[0]), "a number"), "integer": (integer, "an integer"),
-    "boolean": (boolean, "true or false"), "string": (str, "a string"), "rgb": (color, "three numbers"),
-    "spectrum": (spectrum, 'a number, or pairs such as "400:0.2, 700:0.8"')}
+    "float": (lambda text: float(numbers(text)[0]), "a number"),
+    "integer": (integer, "an integer"),
+    "boolean": (boolean, "true or false"),
+    "string": (str, "a string"),
+    "rgb": (color, "three numbers"),
+    "spectrum": (spectrum, 'a number, or pairs such as "400:0.2, 700:0.8"'),
+}
 
 
 def value_of(element: Element, where: str) -> Value:
@@ -160,7 +168,10 @@ def value_of(element: Element, where: str) -> Value:
             return transform([(step.tag, step.attrib) for step in element])
         return _READERS[element.tag][0](attributes["value"])
     except (ValueError, KeyError, IndexError):
-        wanted = _READERS[element.tag][1] if element.tag in _READERS else (
-            f"steps from {', '.join(STEPS)}" if element.tag == "transform" else "three numbers")
+        wanted = (
+            _READERS[element.tag][1]
+            if element.tag in _READERS
+            else (f"steps from {', '.join(STEPS)}" if element.tag == "transform" else "three numbers")
+        )
         given = attributes.get("value", "of these steps" if element.tag == "transform" else "of these attributes")
         raise SceneError(f'{where}: <{element.tag}> "{given}" cannot be read; write {wanted}') from None

@@ -21,8 +21,21 @@ from .values import Color, Doubles, Spectrum, Value, value_of
 Kind = TypeVar("Kind")
 
 VALUES = ("float", "integer", "boolean", "string", "rgb", "spectrum", "point", "vector", "transform")
-PLUGINS = ("scene", "integrator", "sensor", "film", "rfilter", "sampler", "emitter", "shape", "bsdf", "texture",
-           "medium", "phase", "volume")
+PLUGINS = (
+    "scene",
+    "integrator",
+    "sensor",
+    "film",
+    "rfilter",
+    "sampler",
+    "emitter",
+    "shape",
+    "bsdf",
+    "texture",
+    "medium",
+    "phase",
+    "volume",
+)
 #: Maximum nesting depth of includes.
 DEEPEST = 15
 
@@ -136,8 +149,9 @@ class _Document:
         try:
             root = ElementTree.parse(path).getroot()
         except (ElementTree.ParseError, ValueError, RecursionError) as error:
-            raise SceneError(f"is not valid XML: {error}" if path == self._path
-                             else f"{path.name}: is not valid XML: {error}") from None
+            raise SceneError(
+                f"is not valid XML: {error}" if path == self._path else f"{path.name}: is not valid XML: {error}"
+            ) from None
         if root.tag != "scene":
             raise SceneError(f"{path.name}: begins with <{root.tag}>; a Mitsuba scene begins with <scene>")
         return root
@@ -167,8 +181,10 @@ class _Document:
                 value = value_of(child, f"{owner.where}.{name}")
                 owner.values[name] = str(self.file(str(value))) if name == "filename" else value
             else:
-                raise SceneError(f"{owner.where}: <{child.tag}> is unknown; write one of "
-                                 f"{', '.join((*VALUES, *PLUGINS[1:], 'ref', 'include', 'default'))}")
+                raise SceneError(
+                    f"{owner.where}: <{child.tag}> is unknown; write one of "
+                    f"{', '.join((*VALUES, *PLUGINS[1:], 'ref', 'include', 'default'))}"
+                )
 
     def _plugin(self, element: Element, owner: Plugin, depth: int) -> Plugin:
         kind, name = element.get("type", ""), element.get("id", "")
@@ -205,10 +221,12 @@ class _Document:
 
     def _substitute(self, element: Element, where: str) -> None:
         """Replace $NAME in attributes by the value of its <default>."""
+
         def said(match: re.Match[str]) -> str:
             if match[1] not in self._defaults:
                 raise SceneError(f'{where}: ${match[1]} is undefined; write <default name="{match[1]}" …/>')
             return self._defaults[match[1]]
+
         for key, text in element.attrib.items():
             if "$" in text:
                 element.set(key, re.sub(r"\$(\w+)", said, text))

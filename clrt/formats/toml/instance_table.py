@@ -61,12 +61,18 @@ class InstanceReader:
         """Return the materials of what the table's mesh shows, without the table's own."""
         return [each.material for each in self._shown.get(str(table.mesh), [[]])[0]]
 
-    def read(self, table: InstanceTable, repeats: Sequence[Repeat], material: Material | None, where: str,
-             ) -> list[Instance]:
+    def read(
+        self,
+        table: InstanceTable,
+        repeats: Sequence[Repeat],
+        material: Material | None,
+        where: str,
+    ) -> list[Instance]:
         """Return the instances of what the mesh shows, and their copies; raises SceneError for invalid transforms."""
         if (count := prod(repeat.count for repeat in repeats)) > MOST_INSTANCES:
-            raise SceneError(f"{where}.repeat: makes {count} copies; reduce the counts to at most {MOST_INSTANCES} in "
-                             "all")
+            raise SceneError(
+                f"{where}.repeat: makes {count} copies; reduce the counts to at most {MOST_INSTANCES} in all"
+            )
         matrices = table.to_world(where)[None]
         for i, repeat in enumerate(repeats):
             matrices = repeated(matrices, repeat.to_world(f"{where}.repeat[{i}]"), repeat.count)
@@ -75,14 +81,17 @@ class InstanceReader:
                 copy = f", of copy {found.argmax()}," if found.size > 1 else ""
                 raise SceneError(f"{where}: its transform{copy} {fault}; write a nonzero scale")
         shown = self._shown.get(str(table.mesh), [[]])[0]
-        return [replace(moved(each, matrix), material=material or each.material, name=table.name or each.name)
-                for matrix in matrices for each in shown]
+        return [
+            replace(moved(each, matrix), material=material or each.material, name=table.name or each.name)
+            for matrix in matrices
+            for each in shown
+        ]
 
 
 def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray[np.float64]:
     """Return the matrices (n, 4, 4) and count − 1 copies of them, each `step` after the last: (count·n, 4, 4)."""
     copies = [matrices]
-    with np.errstate(all="ignore"):    # the caller reports overflow
+    with np.errstate(all="ignore"):  # the caller reports overflow
         for _ in range(count - 1):
             copies.append(step @ copies[-1])
     return np.concatenate(copies)
@@ -90,13 +99,21 @@ def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray
 
 def placed(model: Model, matrix: Matrix, material: Material | None, others: dict[str, Material]) -> Model:
     """Apply an affine matrix to a model. material: replaces its own; others: replacements by their own names."""
-    meshes = [transform_mesh(replace(mesh, material=others.get(mesh.material_name, material or mesh.material)), matrix)
-              for mesh in model.meshes]
-    instances = [replace(moved(each, matrix), material=others.get(each.mesh.material_name, material or each.material))
-                 for each in model.instances]
+    meshes = [
+        transform_mesh(replace(mesh, material=others.get(mesh.material_name, material or mesh.material)), matrix)
+        for mesh in model.meshes
+    ]
+    instances = [
+        replace(moved(each, matrix), material=others.get(each.mesh.material_name, material or each.material))
+        for each in model.instances
+    ]
     cameras = {name: transform_camera(camera, matrix) for name, camera in model.cameras.items()}
-    return Model(meshes=meshes, instances=instances, cameras=cameras,
-                 lights=[transform_light(light, matrix) for light in model.lights])
+    return Model(
+        meshes=meshes,
+        instances=instances,
+        cameras=cameras,
+        lights=[transform_light(light, matrix) for light in model.lights],
+    )
 
 
 def moved(instance: Instance, matrix: Matrix) -> Instance:

@@ -50,10 +50,15 @@ class MeshTable(Transform):
         if self.normals != "smooth":
             raise SceneError(f'{where}: has crease_degrees, but normals = "{self.normals}"; write normals = "smooth"')
         model = self._read(folder, where)
-        meshes = {number: creased(mesh, self.crease_degrees)
-                  for number, mesh in meshes_by_id([*model.instances, *map(Instance, model.meshes)]).items()}
-        return replace(model, meshes=[meshes[id(mesh)] for mesh in model.meshes],
-                       instances=[replace(each, mesh=meshes[id(each.mesh)]) for each in model.instances])
+        meshes = {
+            number: creased(mesh, self.crease_degrees)
+            for number, mesh in meshes_by_id([*model.instances, *map(Instance, model.meshes)]).items()
+        }
+        return replace(
+            model,
+            meshes=[meshes[id(mesh)] for mesh in model.meshes],
+            instances=[replace(each, mesh=meshes[id(each.mesh)]) for each in model.instances],
+        )
 
     def _read(self, folder: Path, where: str) -> Model:
         inline = self.vertices is not None or self.faces is not None or self.uv is not None

@@ -26,8 +26,19 @@ from .values import toml_key
 
 Kind = TypeVar("Kind")
 Table = Mapping[str, Any]
-SECTIONS = ("camera", "cameras", "animation", "keyframe", "render", "environment", "materials", "mesh", "instance",
-            "sphere", "light")
+SECTIONS = (
+    "camera",
+    "cameras",
+    "animation",
+    "keyframe",
+    "render",
+    "environment",
+    "materials",
+    "mesh",
+    "instance",
+    "sphere",
+    "light",
+)
 
 
 class SceneReader:
@@ -55,23 +66,36 @@ class SceneReader:
             where = f"materials.{name}"
             self._materials[name] = self._typed(MATERIALS, values, where) or Diffuse()
         spheres = [self._sphere(values, f"sphere[{i}]") for i, values in enumerate(self._tables("sphere"))]
-        lights: list[Light] = [self._typed(LIGHTS, values, f"light[{i}]") or SUN  # keeps the later ones' numbers
-                               for i, values in enumerate(self._tables("light"))]
+        lights: list[Light] = [
+            self._typed(LIGHTS, values, f"light[{i}]") or SUN  # keeps the later ones' numbers
+            for i, values in enumerate(self._tables("light"))
+        ]
         models = [self._mesh(values, f"mesh[{i}]") for i, values in enumerate(self._tables("mesh"))]
         lights += [light for model in models for light in model.lights]
         meshes = [mesh for model in models for mesh in model.meshes]
         instances = [instance for model in models for instance in model.instances]
-        instances += [one for i, values in enumerate(self._tables("instance"))
-                      for one in self._instance(values, f"instance[{i}]")]
-        return Scene(meshes=meshes, instances=instances, lights=lights, spheres=[each for each in spheres if each],
-                     camera=self._named_camera(lens) if "name" in lens else camera, cameras=self._cameras,
-                     environment=environment or Environment(), render=render or RenderSettings(),
-                     name=name_of(self._path), animation=self._animation(), materials=self._materials,
-                     source=self._sources())
+        instances += [
+            one for i, values in enumerate(self._tables("instance")) for one in self._instance(values, f"instance[{i}]")
+        ]
+        return Scene(
+            meshes=meshes,
+            instances=instances,
+            lights=lights,
+            spheres=[each for each in spheres if each],
+            camera=self._named_camera(lens) if "name" in lens else camera,
+            cameras=self._cameras,
+            environment=environment or Environment(),
+            render=render or RenderSettings(),
+            name=name_of(self._path),
+            animation=self._animation(),
+            materials=self._materials,
+            source=self._sources(),
+        )
 
     def _sources(self) -> Source:
-        self._source.files += [(picture, (self._path.parent / name).resolve())
-                               for name, picture in self._textures.pictures.items()]
+        self._source.files += [
+            (picture, (self._path.parent / name).resolve()) for name, picture in self._textures.pictures.items()
+        ]
         return self._source
 
     def _camera(self, values: Any, where: str) -> Camera:
@@ -141,8 +165,10 @@ class SceneReader:
             self.problems.append(f"{where}.type: {show(values['type'])} {unknown(values['type'], known)}")
         else:
             rest = {key: value for key, value in values.items() if key != "type"}
-            rest = {key: self._texture(value, f"{where}.{key}") if isinstance(value, dict) else value
-                    for key, value in rest.items()}
+            rest = {
+                key: self._texture(value, f"{where}.{key}") if isinstance(value, dict) else value
+                for key, value in rest.items()
+            }
             made = self._build(known[str(values["type"])], rest, where)
             conflicts = made.conflicts() if isinstance(made, Material) else []
             self.problems += [f"{where}.{conflict}" for conflict in conflicts]
@@ -159,8 +185,11 @@ class SceneReader:
             image = default_sky().image
             if sky != "default":
                 self.problems.append(f'environment.sky: {show(sky)} is unknown; write "default"')
-            self.problems += [f"environment: has both a sky and {key}; keep one of them" for key in ("color", "image")
-                              if key in values]
+            self.problems += [
+                f"environment: has both a sky and {key}; keep one of them"
+                for key in ("color", "image")
+                if key in values
+            ]
         if "image" in values:
             image = self._picture(values["image"])
             self._source.files += [] if image is None else [(image, (self._path.parent / values["image"]).resolve())]
@@ -230,17 +259,26 @@ class SceneReader:
         """Return the table's replacements for the file's `own` materials, by their names."""
         pairs = values.get("materials", {})
         if not isinstance(pairs, dict):
-            self.problems.append(f"{where}.materials: {show(pairs)} is not a table; "
-                                 'write { "name in the file" = "NAME" }')
+            self.problems.append(
+                f'{where}.materials: {show(pairs)} is not a table; write {{ "name in the file" = "NAME" }}'
+            )
             return {}
         if pairs and "material" in values:
             self.problems.append(f"{where}: has both a material and materials; keep one of them")
         named = own - {""}
-        self.problems += [f'{where}.materials: "{name}" '
-                          + (unknown(name, named) if named else "is unknown, as the model has no named materials; "
-                             'write material = "NAME"') for name in pairs if name not in own]
-        return {name: self._named_material(other, f"{where}.materials.{toml_key(name)}")
-                for name, other in pairs.items()}
+        self.problems += [
+            f'{where}.materials: "{name}" '
+            + (
+                unknown(name, named)
+                if named
+                else 'is unknown, as the model has no named materials; write material = "NAME"'
+            )
+            for name in pairs
+            if name not in own
+        ]
+        return {
+            name: self._named_material(other, f"{where}.materials.{toml_key(name)}") for name, other in pairs.items()
+        }
 
     def _instance(self, values: Any, where: str) -> list[Instance]:
         if not isinstance(values, dict):

@@ -30,8 +30,19 @@ from .texture_table import TextureTable
 from .values import is_plain, toml_key, toml_value
 
 #: Fields that are written even at their default, since users change them first.
-TELLING = {"position", "look_at", "fov_degrees", "size", "spp", "max_depth", "color", "metallic", "roughness", "center",
-           "radius"}
+TELLING = {
+    "position",
+    "look_at",
+    "fov_degrees",
+    "size",
+    "spp",
+    "max_depth",
+    "color",
+    "metallic",
+    "roughness",
+    "center",
+    "radius",
+}
 #: Keys of tables that are not copied, since they are written from the scene's current state.
 ASSIGNED = ("material", "materials", "lights")
 #: Name in the scene file of the one material of a file without material names.
@@ -64,8 +75,11 @@ def started(scene: Scene) -> Scene:
         for part in origin.parts:
             mesh = part.mesh if isinstance(part, Instance) else part
             named.setdefault(mesh.material_name, []).append(mesh.material)
-    clear = {name or UNNAMED: same[0] for name, same in named.items()
-             if len(set(same)) == 1 and _is_plain(same[0]) and not (name == UNNAMED and "" in named)}
+    clear = {
+        name or UNNAMED: same[0]
+        for name, same in named.items()
+        if len(set(same)) == 1 and _is_plain(same[0]) and not (name == UNNAMED and "" in named)
+    }
     scene.materials = clear
     return scene
 
@@ -90,9 +104,14 @@ class _Writer:
         self._tables: set[str] = set()
         objects = [*self._read_meshes(), *self._own_objects(), *self._spheres()]
         name = scene.name.encode("unicode_escape").decode()
-        head = [f"# {name} as clrt renders it; edit it as you like (docs/scene-format.md).",
-                *self._section("[camera]", scene.camera), *self._cameras(), *self._animation(),
-                *self._section("[render]", scene.render), *self._environment(scene.environment)]
+        head = [
+            f"# {name} as clrt renders it; edit it as you like (docs/scene-format.md).",
+            *self._section("[camera]", scene.camera),
+            *self._cameras(),
+            *self._animation(),
+            *self._section("[render]", scene.render),
+            *self._environment(scene.environment),
+        ]
         for light in scene.lights:
             head += self._section("[[light]]", light, light.kernel)
         for name, material in self._materials.items():
@@ -103,8 +122,11 @@ class _Writer:
         """Yield the named cameras, except those that a model file defines."""
         cameras = self._scene.cameras
         theirs = [name for name, camera in cameras.items() if self._source.cameras.get(name) == camera]
-        yield from (f"# or, instead of the lines above: name = {toml_value(name)}" for name in theirs
-                    if cameras[name] != self._scene.camera)
+        yield from (
+            f"# or, instead of the lines above: name = {toml_value(name)}"
+            for name in theirs
+            if cameras[name] != self._scene.camera
+        )
         for name in [name for name in cameras if name not in theirs]:
             yield from self._section(f"[cameras.{toml_key(name)}]", cameras[name])
 
@@ -116,8 +138,9 @@ class _Writer:
 
     def _environment(self, sky: Environment) -> Iterator[str]:
         image = sky.image
-        yield from (line for line in self._section("[environment]", sky)
-                    if image is None or not line.startswith("color = "))
+        yield from (
+            line for line in self._section("[environment]", sky) if image is None or not line.startswith("color = ")
+        )
         if image is None:
             return
         file = self._source.file_of(image)
@@ -173,15 +196,23 @@ class _Writer:
             groups.setdefault(mesh.material_name, []).append((material_of(part), own))
         if any(len({material for material, _ in pairs}) > 1 for pairs in groups.values()):
             return None
-        changed = {name: self._name_of(named[0]) for name, pairs in groups.items()
-                   if (named := [each for each, own in pairs if each != own or self._is_named(each)])}
+        changed = {
+            name: self._name_of(named[0])
+            for name, pairs in groups.items()
+            if (named := [each for each, own in pairs if each != own or self._is_named(each)])
+        }
         if "file" not in origin.table or list(changed) == list(groups) == [""]:
             return [f"material = {toml_value(name)}" for name in changed.values()]
         kept = [name for name in groups if name not in changed]
-        return [*(["", "[mesh.materials]  # the file's name = the one above"] if changed else []),
-                *(f"{toml_key(name)} = {toml_value(other)}" for name, other in changed.items()),
-                *([f"# The file's materials: {', '.join(map(toml_value, theirs))}; [mesh.materials] can replace them"]
-                  if (theirs := [name for name in kept if name]) else [])]
+        return [
+            *(["", "[mesh.materials]  # the file's name = the one above"] if changed else []),
+            *(f"{toml_key(name)} = {toml_value(other)}" for name, other in changed.items()),
+            *(
+                [f"# The file's materials: {', '.join(map(toml_value, theirs))}; [mesh.materials] can replace them"]
+                if (theirs := [name for name in kept if name])
+                else []
+            ),
+        ]
 
     def _own_objects(self) -> Iterator[str]:
         """Yield the objects without a table: each mesh in its own file, hidden if only its instances are rendered."""
@@ -195,13 +226,23 @@ class _Writer:
             self._tables.add(name)
             file = self._beside(name, ".glb")
             self.files.models[file] = mesh_glb(mesh)
-            yield from ("", "[[mesh]]", f"name = {toml_value(name)}", f"file = {toml_value(file)}",
-                        f"material = {toml_value(self._name_of(mesh.material))}")
+            yield from (
+                "",
+                "[[mesh]]",
+                f"name = {toml_value(name)}",
+                f"file = {toml_value(file)}",
+                f"material = {toml_value(self._name_of(mesh.material))}",
+            )
             yield from () if id(mesh) in visible else ("visible = false",)
         for each in instances:
             matrix = tuple(map(tuple, [*each.to_world.tolist(), (0.0, 0.0, 0.0, 1.0)]))
-            yield from ("", "[[instance]]", f"mesh = {toml_value(names[id(each.mesh)])}",
-                        f"name = {toml_value(each.name)}", f"matrix = {toml_value(matrix)}")
+            yield from (
+                "",
+                "[[instance]]",
+                f"mesh = {toml_value(names[id(each.mesh)])}",
+                f"name = {toml_value(each.name)}",
+                f"matrix = {toml_value(matrix)}",
+            )
             yield from () if each.material is None else (f"material = {toml_value(self._name_of(each.material))}",)
 
     def _spheres(self) -> Iterator[str]:
@@ -242,8 +283,11 @@ class _Writer:
 
     def _texture(self, texture: Texture) -> str:
         """Return an inline table."""
-        values = {each.name: plain_value(getattr(texture, each.name)) for each in fields(TextureTable)
-                  if each.name != "image" and getattr(texture, each.name) != each.default}
+        values = {
+            each.name: plain_value(getattr(texture, each.name))
+            for each in fields(TextureTable)
+            if each.name != "image" and getattr(texture, each.name) != each.default
+        }
         return toml_value({"image": self._picture(texture.picture), **values})
 
     def _picture(self, picture: Picture) -> str:

@@ -76,8 +76,10 @@ def _numbers(entry: MtlMaterial, key: str, rest: str) -> list[float]:
         numbers = []
     wanted = (1, 3) if key in ("kd", "ks", "ke", "tf") else (1, 2, 3)
     if len(numbers) not in wanted or not all(map(math.isfinite, numbers)):
-        raise SceneError(f'material "{entry.name}": {key.capitalize()} is "{rest[:60]}"; write '
-                         f'{"three numbers" if len(wanted) == 2 else "a number"} in the material library')
+        raise SceneError(
+            f'material "{entry.name}": {key.capitalize()} is "{rest[:60]}"; write '
+            f"{'three numbers' if len(wanted) == 2 else 'a number'} in the material library"
+        )
     return numbers
 
 
@@ -102,8 +104,12 @@ def material(entry: MtlMaterial, maps: Maps) -> Material:
     if {"pr", "pm"} & entry.numbers.keys() or {"map_pr", "map_pm"} & found.keys():
         rough = entry.color("pr", 1.0 if "map_pr" in found else roughness)[0]
         metal = entry.color("pm", 1.0 if "map_pm" in found else 0.0)[0]
-        return MetallicRoughness(color=color, metallic=_numbered(found.get("map_pm"), metal),
-                                 roughness=_numbered(found.get("map_pr"), rough), **shared)
+        return MetallicRoughness(
+            color=color,
+            metallic=_numbered(found.get("map_pm"), metal),
+            roughness=_numbered(found.get("map_pr"), rough),
+            **shared,
+        )
     black = not isinstance(color, Texture) and max(color) < BLACK
     if entry.illumination in MIRRORS and black and max(specular) > BLACK:
         return Mirror(color=specular, **shared)
@@ -112,8 +118,9 @@ def material(entry: MtlMaterial, maps: Maps) -> Material:
     return Diffuse(color=color, **shared)
 
 
-def _painted(texture: Texture | None, entry: MtlMaterial, key: str, missing: float,
-             most: float = 1.0) -> tuple[float, float, float] | Texture:
+def _painted(
+    texture: Texture | None, entry: MtlMaterial, key: str, missing: float, most: float = 1.0
+) -> tuple[float, float, float] | Texture:
     """Return a color, or its map with the color as factor."""
     return entry.color(key, missing, most) if texture is None else replace(texture, factor=entry.color(key, 1.0, most))
 

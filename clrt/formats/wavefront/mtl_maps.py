@@ -14,8 +14,21 @@ from ..images.image_reader import read_texels
 log = logging.getLogger(__name__)
 
 #: Maximum number of arguments of an option; trailing ones may be omitted.
-OPTIONS = {"-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2, "-o": 3,
-           "-s": 3, "-t": 3, "-texres": 1, "-type": 1}
+OPTIONS = {
+    "-blendu": 1,
+    "-blendv": 1,
+    "-bm": 1,
+    "-boost": 1,
+    "-cc": 1,
+    "-clamp": 1,
+    "-imfchan": 1,
+    "-mm": 2,
+    "-o": 3,
+    "-s": 3,
+    "-t": 3,
+    "-texres": 1,
+    "-type": 1,
+}
 CHANNELS: dict[str, Channel] = {"r": "red", "g": "green", "b": "blue", "m": "alpha"}
 
 
@@ -33,8 +46,8 @@ def parse_map(words: str) -> TextureMap:
         count = 1
         while count < OPTIONS[option] and len(rest) > count + 2 and _is_number(rest[count + 1]):
             count += 1
-        options[option] = rest[1:count + 1]
-        rest = rest[count + 1:]
+        options[option] = rest[1 : count + 1]
+        rest = rest[count + 1 :]
     return TextureMap(" ".join(rest), options)
 
 
@@ -55,8 +68,13 @@ class Maps:
         offset_u, offset_v = _pair(options.get("-o"), 0.0)
         wrap: Wrap = "clamp" if options.get("-clamp") == ["on"] else "repeat"
         channel = CHANNELS.get(options.get("-imfchan", ["r"])[0].lower(), "red")
-        return Texture(picture=picture, scale=(scale_u, scale_v), offset=(offset_u, 1 - scale_v - offset_v),
-                       channel=channel, wrap=(wrap, wrap))
+        return Texture(
+            picture=picture,
+            scale=(scale_u, scale_v),
+            offset=(offset_u, 1 - scale_v - offset_v),
+            channel=channel,
+            wrap=(wrap, wrap),
+        )
 
     def _picture(self, name: str) -> Picture | None:
         if name not in self._pictures:

@@ -48,9 +48,14 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
             numbers, triples = _distinct(triples)
             where = triples.T - 1
             meshes[name] = {
-                "vertices": points[where[0], :3], "faces": numbers[faces], "vertex_normals": _taken(normals, where[2]),
-                "uv": _taken(uv, where[1]), "vertex_colors": None if colors is None else colors[where[0]],
-                "material": libraries.get(name), "material_name": name}
+                "vertices": points[where[0], :3],
+                "faces": numbers[faces],
+                "vertex_normals": _taken(normals, where[2]),
+                "uv": _taken(uv, where[1]),
+                "vertex_colors": None if colors is None else colors[where[0]],
+                "material": libraries.get(name),
+                "material_name": name,
+            }
     if len(meshes) == 1:
         return {name_of(path): mesh for mesh in meshes.values()}
     return {name or free_name(name_of(path), meshes): mesh for name, mesh in meshes.items()}
@@ -69,7 +74,8 @@ def absolute_indices(text: str) -> str:
         elif key == "f":
             corners = [zip(entry.split("/"), counts.values()) for entry in entries]
             lines[number] = "f " + " ".join(
-                "/".join(_absolute(index, count) for index, count in corner) for corner in corners)
+                "/".join(_absolute(index, count) for index, count in corner) for corner in corners
+            )
     return "\n".join(lines)
 
 
@@ -100,11 +106,13 @@ def _table(text: str, key: str, least: int) -> Floats:
 
 def _odd(rows: list[list[str]], least: int) -> list[str]:
     """Return the first row without enough numbers."""
+
     def is_odd(row: list[str]) -> bool:
         try:
             return len(list(map(float, row))) < least
         except ValueError:
             return True
+
     return next(filter(is_odd, rows), [])
 
 
@@ -119,7 +127,8 @@ def _fans(polygons: list[list[str]]) -> tuple[list[str], Ints]:
     step = np.arange(len(polygon)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
     start = first[polygon]
     return [corner for corners in polygons for corner in corners], np.stack(
-        [start, start + step + 1, start + step + 2], axis=1)
+        [start, start + step + 1, start + step + 2], axis=1
+    )
 
 
 def _indices(corners: list[str], counts: tuple[int, int, int]) -> Ints:
@@ -130,10 +139,10 @@ def _indices(corners: list[str], counts: tuple[int, int, int]) -> Ints:
         if len(slashes) == 1:
             numbers = " ".join(corners).replace("//", "/0/").replace("/", " ").split() if slashes != {0} else corners
             given = np.array(numbers, np.int64).reshape(len(corners), -1)
-            rows[:, :given.shape[1]] = given
+            rows[:, : given.shape[1]] = given
         else:
             for row, corner in zip(rows, corners):
-                row[:corner.count("/") + 1] = [int(index or 0) for index in corner.split("/")]
+                row[: corner.count("/") + 1] = [int(index or 0) for index in corner.split("/")]
     except (ValueError, OverflowError):
         raise SceneError("a face has a corner that is not an index; repair the file") from None
     if (rows[:, 0] == 0).any():
@@ -169,8 +178,12 @@ def _libraries(path: Path, text: str) -> dict[str, Material]:
         names = [line] if (path.parent / line).is_file() else line.split()
         for library in (path.parent / name for name in names):
             if not library.is_file():
-                log.warning("%s: no material library %s; %s", path, library.name,
-                            f"using {own.name}" if own.is_file() else "its materials are plain gray")
+                log.warning(
+                    "%s: no material library %s; %s",
+                    path,
+                    library.name,
+                    f"using {own.name}" if own.is_file() else "its materials are plain gray",
+                )
                 library = own
             if library.is_file():
                 try:

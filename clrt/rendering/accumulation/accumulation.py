@@ -87,7 +87,7 @@ class Accumulation(ABC):
         """Mark the work as torn if an exception such as Ctrl-C may have left the film and the work inconsistent."""
         try:
             yield
-        except GeneratorExit:    # raised between launches
+        except GeneratorExit:  # raised between launches
             raise
         except BaseException:
             self._torn = True
@@ -104,8 +104,8 @@ class Accumulation(ABC):
             self.work.settle()
 
     def _settle(self) -> None:
-        """Complete the work if nothing is pending or in flight; not if it is torn, as the missing samples are unknown.
-        """
+        """Complete the work if nothing is pending or in flight; not if it is torn, as the missing samples are
+        unknown."""
         if not self._torn:
             self.work.settle()
 

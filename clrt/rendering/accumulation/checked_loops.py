@@ -70,6 +70,8 @@ def check_paths(device: Device, unfinished: int, paths: int) -> None:
 
 
 def _refusal(device: Device, turns: int, what: str) -> DeviceError:
-    return DeviceError(f"{device.info.name} ({device.info.platform}): the driver ends every loop of a work-item after "
-                       f"{turns} iterations, and {what} of this scene need more; use another device, or shorten "
-                       "the paths with --depth")
+    return DeviceError(
+        f"{device.info.name} ({device.info.platform}): the driver ends every loop of a work-item after "
+        f"{turns} iterations, and {what} of this scene need more; use another device, or shorten "
+        "the paths with --depth"
+    )

@@ -41,8 +41,14 @@ class DevicePool:
     launches: see `LaunchPlan.record`; tiles: maximum number of tiles of a film; before: see `SceneOnDevice`.
     """
 
-    def __init__(self, devices: Sequence[Device], compiled: Sequence[CompiledScene], launches: Sequence[NDArray[Any]],
-                 tiles: int, before: Sequence[SceneOnDevice] = ()) -> None:
+    def __init__(
+        self,
+        devices: Sequence[Device],
+        compiled: Sequence[CompiledScene],
+        launches: Sequence[NDArray[Any]],
+        tiles: int,
+        before: Sequence[SceneOnDevice] = (),
+    ) -> None:
         self.workers: list[DeviceWorker] = []
         self.lost: list[DeviceWorker] = []
         for device, scene, launch in zip(devices, compiled, launches):
@@ -63,9 +69,16 @@ class DevicePool:
 
     def shares(self) -> list[dict[str, Any]]:
         """Return what each device rendered, for the report."""
-        return [{"device": worker.name, "platform": worker.scene.device.info.platform, "samples": worker.samples,
-                 "longest_launch_seconds": worker.launches.longest, "lost": worker in self.lost}
-                for worker in self.everyone]
+        return [
+            {
+                "device": worker.name,
+                "platform": worker.scene.device.info.platform,
+                "samples": worker.samples,
+                "longest_launch_seconds": worker.launches.longest,
+                "lost": worker in self.lost,
+            }
+            for worker in self.everyone
+        ]
 
     @property
     def at(self) -> list[WorkerShare]:
@@ -97,11 +110,16 @@ class DevicePool:
         size = worker.launches.size / TILE_PIXELS
         fair = work.left * worker.launches.size / sum(other.launches.size for other in self.workers) / 2
         busy = [share.part for share in self.at]
-        part = work.cut(int(min(size, max(fair, size / SMALLEST))), FEWEST_TILES, worker.window_tiles,
-                        worker.scene.most_samples, busy)
+        part = work.cut(
+            int(min(size, max(fair, size / SMALLEST))),
+            FEWEST_TILES,
+            worker.window_tiles,
+            worker.scene.most_samples,
+            busy,
+        )
         if part is None:
             return
-        rows = work.tiles[part.first:part.end]
+        rows = work.tiles[part.first : part.end]
         try:
             worker.begin(WorkerShare(part, rows, numbers[rows], film[rows]))
         except DeviceError as error:
@@ -116,7 +134,7 @@ class DevicePool:
                 while share := worker.ended():
                     film[share.rows] = share.pixels
                     count += 1
-                if worker.at and worker.launches.idle:    # Ctrl-C came between a launch and the record of its share
+                if worker.at and worker.launches.idle:  # Ctrl-C came between a launch and the record of its share
                     self._take_back(worker, work)
                     worker.at.clear()
             except DeviceError as error:

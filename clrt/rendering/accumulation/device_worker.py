@@ -43,8 +43,14 @@ class WorkerShare(NamedTuple):
 class DeviceWorker:
     """Renders shares of an image of `tiles` tiles. Raises DeviceError if it cannot, or fails later."""
 
-    def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], tiles: int,
-                 before: Sequence[SceneOnDevice] = ()) -> None:
+    def __init__(
+        self,
+        device: Device,
+        compiled: CompiledScene,
+        launch: NDArray[Any],
+        tiles: int,
+        before: Sequence[SceneOnDevice] = (),
+    ) -> None:
         self._tile_bytes = TILE_PIXELS * compiled.choices.pixel.itemsize
         self.window_tiles = max(1, min(tiles, min(WINDOW, largest_film(device, compiled)) // self._tile_bytes))
         film_bytes = IN_FLIGHT * self.window_tiles * self._tile_bytes
@@ -65,9 +71,13 @@ class DeviceWorker:
         while True:
             try:
                 with self.scene.allocating():
-                    windows = [LaunchBuffers(cl.Buffer(context, flags, self.window_tiles * self._tile_bytes),
-                                             cl.Buffer(context, flags, self.window_tiles * 4))
-                               for _ in range(IN_FLIGHT)]
+                    windows = [
+                        LaunchBuffers(
+                            cl.Buffer(context, flags, self.window_tiles * self._tile_bytes),
+                            cl.Buffer(context, flags, self.window_tiles * 4),
+                        )
+                        for _ in range(IN_FLIGHT)
+                    ]
                     for window in windows:
                         self.scene.warm_up(*window)
                 return deque(windows)

@@ -32,7 +32,8 @@ def first_hits(session: Accumulation, scene: Scene, names: Collection[str]) -> d
     seen = render_pixels(session, source, "first_hit", kind, SAMPLES if means else 0)
     pictures: dict[str, NDArray[np.generic]] = {
         name: np.ascontiguousarray(seen[name] if len(AOV_TYPES[name].channels) == 3 else seen[name][..., 0])
-        for name in means + centers}
+        for name in means + centers
+    }
     missed = seen["primitive"] < 0
     if "position" in centers:
         pictures |= _places(session, seen["position"].astype(np.float64), missed)
@@ -48,24 +49,34 @@ def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[
     for name in means + centers:
         fields |= {name: "3f4", f"pad_{name}": "i4"}
     kind = record(**fields)
-    defines = [f"#define {macro}(X) {' '.join(f'X({name})' for name in listed)}"
-               for macro, listed in (("SEEN_MEANS", means), ("SEEN_MIDDLE", centers))]
+    defines = [
+        f"#define {macro}(X) {' '.join(f'X({name})' for name in listed)}"
+        for macro, listed in (("SEEN_MEANS", means), ("SEEN_MIDDLE", centers))
+    ]
     reads = {AOV_TYPES[name].reads for name in means + centers}
     bent = "normal" in reads and "NORMAL_MAPS" in compiled.features
     materials = ["bsdf/dispatch.cl"] if bent or "bsdf" in reads else []
-    return compiled.source_of("aov/first_hit.cl", f"#define SEEN_MATERIALS {len(materials)}",
-                              typedefs({"FirstHit": kind}), *defines, SEEN_FILES=materials), kind
+    return compiled.source_of(
+        "aov/first_hit.cl",
+        f"#define SEEN_MATERIALS {len(materials)}",
+        typedefs({"FirstHit": kind}),
+        *defines,
+        SEEN_FILES=materials,
+    ), kind
 
 
 def _seen(names: Collection[str]) -> tuple[list[str], list[str]]:
     """Return the AOVs that the kernel computes for `names`, those averaged over a pixel and those of its center."""
     needed = {*names, "position"} if "depth" in names else set(names)
-    return ([name for name in aovs_from("mean") if name in needed],
-            [name for name in aovs_from("center") if name in needed])
+    return (
+        [name for name in aovs_from("mean") if name in needed],
+        [name for name in aovs_from("center") if name in needed],
+    )
 
 
-def _places(session: Accumulation, seen: NDArray[np.float64],
-            missed: NDArray[np.bool_]) -> dict[str, NDArray[np.generic]]:
+def _places(
+    session: Accumulation, seen: NDArray[np.float64], missed: NDArray[np.bool_]
+) -> dict[str, NDArray[np.generic]]:
     """Return position and depth of points (height, width, 3) given in the compiled scene's frame."""
     camera, frame = session.compiled.camera, session.compiled.frame
     axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
@@ -74,8 +85,10 @@ def _places(session: Accumulation, seen: NDArray[np.float64],
         depth = np.linalg.norm(ahead, axis=-1) / frame.unit
     else:
         depth = ahead @ (axis / np.linalg.norm(axis)) / frame.unit
-    return {"position": np.where(missed[..., None], 0, seen / frame.unit + frame.center).astype(np.float32),
-            "depth": np.where(missed, np.inf, depth).astype(np.float32)}
+    return {
+        "position": np.where(missed[..., None], 0, seen / frame.unit + frame.center).astype(np.float32),
+        "depth": np.where(missed, np.inf, depth).astype(np.float32),
+    }
 
 
 def _ids(session: Accumulation, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:

@@ -39,15 +39,18 @@ class LaunchPlan:
     def record(self, compiled: CompiledScene) -> NDArray[Any]:
         """Return the LAUNCH record of a scene's image, without a range of pixels and samples."""
         launch = launch_record(compiled.camera, self.size)
-        launch["max_depth"], launch["seed"], launch["block_bits"] = (self.max_depth, self.seed,
-                                                                     block_bits(self.planned_spp))
+        launch["max_depth"], launch["seed"], launch["block_bits"] = (
+            self.max_depth,
+            self.seed,
+            block_bits(self.planned_spp),
+        )
         launch["clamp_direct"], launch["clamp_indirect"] = compiled.clamps
         return launch
 
 
 def first_launch_samples(compiled: CompiledScene) -> int:
-    """Return the samples of the first launch, before any has been timed: fewer if rays are intersected by brute force.
-    """
+    """Return the samples of the first launch, before any has been timed: fewer if rays are intersected by brute
+    force."""
     primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
     slow = compiled.tree.name in TREELESS and primitives > QUICKLY_MET
     return FIRST_LAUNCH_SAMPLES * QUICKLY_MET // primitives if slow else FIRST_LAUNCH_SAMPLES

@@ -97,15 +97,17 @@ class MultiDeviceAccumulation(LocalAccumulation):
         self.work, self._film = work, tile_by_tile(film.pixels)
 
 
-def make_pool(devices: Sequence[Device], compiled: Sequence[CompiledScene], plan: LaunchPlan,
-              before: Sequence[SceneOnDevice] = ()) -> DevicePool:
+def make_pool(
+    devices: Sequence[Device], compiled: Sequence[CompiledScene], plan: LaunchPlan, before: Sequence[SceneOnDevice] = ()
+) -> DevicePool:
     """Return a pool for the planned image; before: see `SceneOnDevice`."""
     rows, columns = tiles_of(plan.size)
     return DevicePool(devices, compiled, [plan.record(scene) for scene in compiled], rows * columns, before)
 
 
-def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], plan: LaunchPlan,
-                 before: Sequence[SceneOnDevice] = ()) -> LocalAccumulation:
+def make_picture(
+    devices: Sequence[Device], compiled: Sequence[CompiledScene], plan: LaunchPlan, before: Sequence[SceneOnDevice] = ()
+) -> LocalAccumulation:
     """Return that of a single device if it has room for the film, else that of a pool; before: see `SceneOnDevice`."""
     if len(devices) == 1:
         with suppress(NoRoomError):

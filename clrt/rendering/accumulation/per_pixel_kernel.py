@@ -27,8 +27,10 @@ def render_pixels(session: Accumulation, source: str, name: str, record: np.dtyp
     without `first_hits` and traces no rays.
     """
     if session.compiled.tree is NO_RAYS:
-        raise UsageError("this image traces no rays, so there is no BVH for them: request first hits when creating "
-                         "the renderer (first_hits=True)")
+        raise UsageError(
+            "this image traces no rays, so there is no BVH for them: request first hits when creating "
+            "the renderer (first_hits=True)"
+        )
     device = session.device
     kernel = make_kernel(device, build(device, WINDOWS + source), name)
     order = scattered(session.tile_samples.size).astype(np.uint32)
@@ -48,7 +50,7 @@ def render_pixels(session: Accumulation, source: str, name: str, record: np.dtyp
         launches.add(session.enqueue(kernel, count * TILE_PIXELS), count * work)
         launches.wait()
         found = DeviceArray(window.buffer, record, count * TILE_PIXELS).read(device)
-        pixels[order[done:done + count]] = found.reshape(count, TILE_PIXELS)
+        pixels[order[done : done + count]] = found.reshape(count, TILE_PIXELS)
         done += count
     values = row_by_row(pixels, session.size)
     check_pixels(device, values)

@@ -58,8 +58,10 @@ class RasterBins:
         before = drawn_before(compiled)
         self._drawn = int(before[-1]), int(compiled.counts["spheres"][0])
         if sum(self._drawn) > MOST:
-            raise NoRoomError(f"{sum(self._drawn)} primitives are too many to rasterise, at most {MOST}; use the "
-                              "integrator local, or fewer instances")
+            raise NoRoomError(
+                f"{sum(self._drawn)} primitives are too many to rasterise, at most {MOST}; use the "
+                "integrator local, or fewer instances"
+            )
         self._blocks = DataParallel(device, compiled.source_of("raster/outline.cl"))
         self._before, self._instances = self._blocks.upload(before.astype(np.uint32)), len(before) - 1
         self._view = b""
@@ -93,8 +95,11 @@ class RasterBins:
         starts = np.append(0, np.cumsum(blocks.download(counts, np.uint32, bins), dtype=np.int64))
         seen = int(blocks.download(numbers, np.uint32, 1)[0])
         self._check(needs, starts.astype(np.uint32).nbytes, 4 * int(starts[-1]), seen * OUTLINE.itemsize)
-        self._held = [blocks.upload(starts.astype(np.uint32)), blocks.empty(np.uint32, int(starts[-1])),
-                      blocks.empty(OUTLINE, seen)]
+        self._held = [
+            blocks.upload(starts.astype(np.uint32)),
+            blocks.empty(np.uint32, int(starts[-1])),
+            blocks.empty(OUTLINE, seen),
+        ]
         places = blocks.upload(starts[:-1].astype(np.uint32))
         numbers_again = blocks.zeros(np.uint32, 1)
         self._run(launch, 1, numbers_again, places, *self._held[1:])
@@ -113,6 +118,8 @@ class RasterBins:
         info = self._device.info
         check_room(info, {**needs, **dict(zip(("bin_starts", "bin_entries", "outlines"), sizes))})
         if max(sizes) > info.max_alloc_bytes:
-            raise NoRoomError(f"{info.name}: rasterising this view needs a buffer of {size(max(sizes))}, and buffers "
-                              f"of this device have at most {size(info.max_alloc_bytes)}; use the integrator local, a "
-                              "smaller image or fewer primitives")
+            raise NoRoomError(
+                f"{info.name}: rasterising this view needs a buffer of {size(max(sizes))}, and buffers "
+                f"of this device have at most {size(info.max_alloc_bytes)}; use the integrator local, a "
+                "smaller image or fewer primitives"
+            )

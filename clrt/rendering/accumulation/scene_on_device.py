@@ -50,8 +50,15 @@ class SceneOnDevice:
     Raises DeviceError, with the numbers, if scene and film do not fit, and KernelError.
     """
 
-    def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], film_bytes: int,
-                 windows: bool = False, before: Sequence[SceneOnDevice] = ()) -> None:
+    def __init__(
+        self,
+        device: Device,
+        compiled: CompiledScene,
+        launch: NDArray[Any],
+        film_bytes: int,
+        windows: bool = False,
+        before: Sequence[SceneOnDevice] = (),
+    ) -> None:
         self.device, self.compiled, self.launch, self.film_bytes = device, compiled, launch, film_bytes
         self._bins: RasterBins | None = None
         self._check_memory()
@@ -61,11 +68,14 @@ class SceneOnDevice:
         self._windows = windows
         last = next((each for each in before if each.device is device), None)
         self._warm = last is not None and last._windows == windows and last.compiled.has_text_of(compiled)
-        self.program: BuiltProgram = (last.program if last and self._warm
-                                      else build(device, WINDOWS * windows + compiled.source, compiled.bytes))
+        self.program: BuiltProgram = (
+            last.program if last and self._warm else build(device, WINDOWS * windows + compiled.source, compiled.bytes)
+        )
         with self.allocating():
-            self._buffers = {name: last and last._buffer(name, array) or self._uploaded(array)
-                             for name, (_, array) in compiled.buffers.items()}
+            self._buffers = {
+                name: last and last._buffer(name, array) or self._uploaded(array)
+                for name, (_, array) in compiled.buffers.items()
+            }
         self._kernel = make_kernel(device, self.program, compiled.kernel)
         #: Leading arguments of every kernel of the scene (SCENE_PARAMETERS).
         self.scene_arguments = [*sum(self._buffers.values(), []), compiled.counts[0]]
@@ -82,7 +92,7 @@ class SceneOnDevice:
     def _buffer(self, name: str, array: Any) -> list[cl.Buffer] | None:
         """Return the buffer of this name if its content equals an array."""
         own = self.compiled.buffers.get(name, (None, None))[1]
-        kept = isinstance(array, np.ndarray) or self.compiled.part_bytes is None    # parts are copies
+        kept = isinstance(array, np.ndarray) or self.compiled.part_bytes is None  # parts are copies
         return self._buffers[name] if kept and same_content(own, array) else None
 
     @property
@@ -94,15 +104,20 @@ class SceneOnDevice:
     def _needs(self) -> dict[str, int]:
         """Device memory in bytes by purpose, except for the raster bins."""
         arrays = self.compiled.buffers.items()
-        return {**{name: array_bytes(array, self.compiled.part_bytes) for name, (_, array) in arrays},
-                "film": self.film_bytes}
+        return {
+            **{name: array_bytes(array, self.compiled.part_bytes) for name, (_, array) in arrays},
+            "film": self.film_bytes,
+        }
 
     def _check_memory(self) -> None:
         compiled, part_bytes = self.compiled, self.compiled.part_bytes
         pointers = sum(part_count(array, part_bytes) for _, array in compiled.buffers.values())
-        check_memory(self.device.info, self._needs,
-                     8 * pointers + compiled.counts.itemsize + self.launch.itemsize + OTHER_PARAMETERS,
-                     self.device.cl.max_parameter_size)
+        check_memory(
+            self.device.info,
+            self._needs,
+            8 * pointers + compiled.counts.itemsize + self.launch.itemsize + OTHER_PARAMETERS,
+            self.device.cl.max_parameter_size,
+        )
 
     @contextmanager
     def allocating(self) -> Iterator[None]:

@@ -41,16 +41,18 @@ class _Tiles:
 class SingleDeviceAccumulation(LocalAccumulation):
     """Accumulation of one compiled scene at one size, on one device. Raises NoRoomError if scene or film do not fit."""
 
-    def __init__(self, device: Device, compiled: CompiledScene, plan: LaunchPlan,
-                 before: Sequence[SceneOnDevice] = ()) -> None:
+    def __init__(
+        self, device: Device, compiled: CompiledScene, plan: LaunchPlan, before: Sequence[SceneOnDevice] = ()
+    ) -> None:
         size = plan.size
         super().__init__(size)
         film_bytes = size[0] * size[1] * compiled.choices.pixel.itemsize
         if film_bytes > largest_film(device, compiled):
-            raise NoRoomError(f"{device.info.name}: a film of {size[0]}x{size[1]} does not fit into a buffer; use a "
-                              "smaller --size")
+            raise NoRoomError(
+                f"{device.info.name}: a film of {size[0]}x{size[1]} does not fit into a buffer; use a smaller --size"
+            )
         self._scene = SceneOnDevice(device, compiled, plan.record(compiled), film_bytes, before=before)
-        self._copies = HostMemory(size[::-1], compiled.choices.pixel)   # everything else has been allocated
+        self._copies = HostMemory(size[::-1], compiled.choices.pixel)  # everything else has been allocated
         self._launches = Launches(first_launch_samples(compiled))
         with self._scene.allocating():
             self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))
@@ -74,13 +76,14 @@ class SingleDeviceAccumulation(LocalAccumulation):
         return chain((None,), launches)
 
     def _work(self) -> Iterator[None]:
-        while share := self.work.cut(self._launches.size // TILE_PIXELS, FEWEST_TILES,
-                                     most_samples=self._scene.most_samples):
+        while share := self.work.cut(
+            self._launches.size // TILE_PIXELS, FEWEST_TILES, most_samples=self._scene.most_samples
+        ):
             pixels = (share.end - share.first) * TILE_PIXELS
             self.launch["first_pixel"], self.launch["pixel_count"] = share.first * TILE_PIXELS, pixels
             self.launch["first_sample"], self.launch["sample_count"] = share.samples, share.more
             event = self._launch()
-            self.work.settle()    # before waiting, which Ctrl-C may interrupt
+            self.work.settle()  # before waiting, which Ctrl-C may interrupt
             self._launches.add(event, pixels * share.more)
             yield
 

@@ -40,10 +40,16 @@ class WorkQueue:
     tiles: uint32 numbers of the pending tiles, in their order on the device. parts: what is still pending.
     """
 
-    def __init__(self, samples: NDArray[np.int64], then: NDArray[np.int64] | None = None,
-                 tiles: NDArray[np.uint32] | None = None, parts: Iterable[WorkPart] = ()) -> None:
-        self._now = _Now(samples, samples if then is None else then,
-                         np.zeros(0, np.uint32) if tiles is None else tiles, tuple(parts))
+    def __init__(
+        self,
+        samples: NDArray[np.int64],
+        then: NDArray[np.int64] | None = None,
+        tiles: NDArray[np.uint32] | None = None,
+        parts: Iterable[WorkPart] = (),
+    ) -> None:
+        self._now = _Now(
+            samples, samples if then is None else then, np.zeros(0, np.uint32) if tiles is None else tiles, tuple(parts)
+        )
 
     @property
     def samples(self) -> NDArray[np.int64]:
@@ -69,7 +75,7 @@ class WorkQueue:
         """Add work for these tiles; none may be pending yet."""
         parts, then = tuple(parts), self.samples.copy()
         for part in parts:
-            then.ravel()[tiles[part.first:part.end]] += part.more
+            then.ravel()[tiles[part.first : part.end]] += part.more
         self._now = _Now(self.samples, then, tiles.astype(np.uint32), parts)
 
     def add_to_all(self, samples: int) -> None:
@@ -82,11 +88,22 @@ class WorkQueue:
         samples, places = self.samples.ravel()[tiles], np.argsort(scattered(self.samples.size))
         order = np.lexsort((places[tiles], samples))
         levels, firsts = (found.tolist() for found in np.unique(samples[order], return_index=True))
-        self.take(tiles[order], [WorkPart(first, end, level, level) for first, end, level
-                                 in zip(firsts, [*firsts[1:], len(tiles)], levels)])
+        self.take(
+            tiles[order],
+            [
+                WorkPart(first, end, level, level)
+                for first, end, level in zip(firsts, [*firsts[1:], len(tiles)], levels)
+            ],
+        )
 
-    def cut(self, most: int, least_tiles: int, most_tiles: int | None = None, most_samples: int | None = None,
-            busy: Sequence[WorkPart] = ()) -> WorkPart | None:
+    def cut(
+        self,
+        most: int,
+        least_tiles: int,
+        most_tiles: int | None = None,
+        most_samples: int | None = None,
+        busy: Sequence[WorkPart] = (),
+    ) -> WorkPart | None:
         """Remove and return the next part of the pending work, of about `most` tiles times samples per pixel: at least
         `least_tiles` tiles, at most `most_tiles` and `most_samples` per pixel, and none among the `busy`. Return None
         if nothing is left for now.
@@ -102,7 +119,7 @@ class WorkQueue:
         end = min(free_end, first + min(max(least_tiles, most // more), most_tiles or part.end))
         share = WorkPart(first, end, part.samples, min(more, max(1, most // (end - first))))
         rest = [piece for piece in (part._replace(end=first), part._replace(first=end)) if piece.first < piece.end]
-        left = [*self.parts[:place], *rest, *self.parts[place + 1:]]
+        left = [*self.parts[:place], *rest, *self.parts[place + 1 :]]
         if share.more < part.more:
             _put_last(left, WorkPart(first, end, part.samples + share.more, part.more - share.more))
         self._now = self._now._replace(parts=tuple(left))
@@ -113,12 +130,12 @@ class WorkQueue:
         taken = np.zeros(len(self.tiles) + 1, bool)
         taken[-1] = True
         for part in busy:
-            taken[part.first:part.end] = True
+            taken[part.first : part.end] = True
         for place, part in enumerate(self.parts):
-            first = part.first + int(taken[part.first:part.end].argmin())
+            first = part.first + int(taken[part.first : part.end].argmin())
             if not taken[first]:
                 return place, first, min(part.end, first + int(taken[first:].argmax()))
-            taken[part.first:part.end] = True
+            taken[part.first : part.end] = True
         return None
 
     def give_back(self, share: WorkPart) -> None:
@@ -135,8 +152,11 @@ class WorkQueue:
         regardless of what was cut; nothing may be in flight."""
         has, then = found.ravel()[self.tiles], self.then.ravel()[self.tiles]
         ends = [*(np.flatnonzero((np.diff(has) != 0) | (np.diff(then) != 0)) + 1).tolist(), len(has)]
-        parts = [WorkPart(first, end, int(has[first]), int(then[first] - has[first]))
-                 for first, end in zip([0, *ends], ends) if first < end and has[first] < then[first]]
+        parts = [
+            WorkPart(first, end, int(has[first]), int(then[first] - has[first]))
+            for first, end in zip([0, *ends], ends)
+            if first < end and has[first] < then[first]
+        ]
         self._now = self._now._replace(parts=tuple(parts))
         self.settle()
 

@@ -52,8 +52,9 @@ def check_replaceable(path: Path, beginning: bytes) -> None:
     except OSError as error:
         raise CheckpointError(f"{path}: cannot be read ({error.strerror}); choose another file") from error
     if not beginning.startswith(found):
-        raise CheckpointError(f"{path}: exists and is not a checkpoint, so it is not replaced; choose another file, "
-                              "or remove it first")
+        raise CheckpointError(
+            f"{path}: exists and is not a checkpoint, so it is not replaced; choose another file, or remove it first"
+        )
 
 
 def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, keep_older: bool = True) -> None:
@@ -70,7 +71,7 @@ def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, k
     try:
         with open(temporary, "wb", buffering=0) as file:
             pieces: list[bytes | memoryview] = [MAGIC, line, *map(_bytes, arrays.values())]
-            digest = beside(lambda: _digest(pieces))    # both take long, and both release the GIL
+            digest = beside(lambda: _digest(pieces))  # both take long, and both release the GIL
             write_past_cache(file.fileno(), _followed_by(pieces, digest))
             os.fsync(file.fileno())
         keep_mode(target, temporary)
@@ -114,8 +115,9 @@ def _header(line: bytes, kinds: Mapping[str, np.dtype[Any]]) -> tuple[dict[str, 
     try:
         read = json.loads(line)
         header, shapes = dict(read["header"]), dict(read["shapes"])
-        good = set(shapes) == set(kinds) and all(type(n) is int and 0 <= n < 1 << 40 and len(shape) < 5
-                                                 for shape in shapes.values() for n in shape)
+        good = set(shapes) == set(kinds) and all(
+            type(n) is int and 0 <= n < 1 << 40 and len(shape) < 5 for shape in shapes.values() for n in shape
+        )
     except (ValueError, TypeError, LookupError, RecursionError):
         good = False
     if not good:

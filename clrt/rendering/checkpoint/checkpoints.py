@@ -39,8 +39,8 @@ class Checkpoints:
         self._writing: Callable[[], None] = lambda: None
 
     def warn_of_another(self) -> None:
-        """Warn that this render replaces an existing checkpoint. Raises CheckpointError if the file is something else.
-        """
+        """Warn that this render replaces an existing checkpoint. Raises CheckpointError if the file is something
+        else."""
         check_replaceable(self.path, FAMILY)
         if self.path.exists():
             _log.warning("%s: this checkpoint will be replaced; to continue from it, use --resume", self.path)
@@ -62,15 +62,22 @@ class Checkpoints:
     def write(self, kept: SavedState) -> None:
         """Write a checkpoint; if that fails, warn once and keep the previous one."""
         start = time.perf_counter()
-        header = {"facts": self._facts, "device": self._device, "planned_spp": kept.planned_spp,
-                  "seconds": kept.seconds}
+        header = {
+            "facts": self._facts,
+            "device": self._device,
+            "planned_spp": kept.planned_spp,
+            "seconds": kept.seconds,
+        }
         try:
             write_checkpoint(self.path, header, to_arrays(kept), keep_older=self._newest_is_whole)
             self._failed, self._newest_is_whole = False, True
         except OSError as error:
             if not self._failed:
-                _log.warning("%s: the checkpoint cannot be written (%s); the render continues and tries again later",
-                             self.path, error.strerror or error)
+                _log.warning(
+                    "%s: the checkpoint cannot be written (%s); the render continues and tries again later",
+                    self.path,
+                    error.strerror or error,
+                )
             self._failed = True
         end = time.perf_counter()
         self._next = end + max(self._every, COST * (end - start))
@@ -96,9 +103,10 @@ class Checkpoints:
             self._warn(path, header, problems)
             return kept
         if problems:
-            check_replaceable(self.path, FAMILY)    # else starting afresh would be refused, too
-            raise CheckpointError(f"{'; '.join(problems)}; there is nothing to resume: leave out --resume to start "
-                                  "afresh")
+            check_replaceable(self.path, FAMILY)  # else starting afresh would be refused, too
+            raise CheckpointError(
+                f"{'; '.join(problems)}; there is nothing to resume: leave out --resume to start afresh"
+            )
         _log.warning("%s: does not exist yet, so the render starts afresh", self.path)
         return None
 
@@ -106,19 +114,26 @@ class Checkpoints:
         if not isinstance(found := header.get("facts"), dict):
             raise ValueError(NO_SENSE)
         if others := differences(found, self._facts):
-            raise CheckpointError(f"{path}: is a checkpoint of another render ({', '.join(others)}); use its settings "
-                                  "to resume it, choose another file, or leave out --resume to start afresh")
+            raise CheckpointError(
+                f"{path}: is a checkpoint of another render ({', '.join(others)}); use its settings "
+                "to resume it, choose another file, or leave out --resume to start afresh"
+            )
 
     def _warn(self, path: Path, header: dict[str, Any], problems: list[str]) -> None:
         if problems:
             _log.warning("%s; resuming from the older %s", "; ".join(problems), path)
         if header.get("device") != self._device:
-            _log.warning("%s: was started on %s; samples from %s may be rounded differently", path,
-                         header.get("device"), self._device)
+            _log.warning(
+                "%s: was started on %s; samples from %s may be rounded differently",
+                path,
+                header.get("device"),
+                self._device,
+            )
 
 
-def open_checkpoints(policy: CheckpointPolicy, scene: Scene, choices: Choices,
-                     device: str) -> tuple[Checkpoints | None, SavedState | None]:
+def open_checkpoints(
+    policy: CheckpointPolicy, scene: Scene, choices: Choices, device: str
+) -> tuple[Checkpoints | None, SavedState | None]:
     """Return a render's checkpoints, if enabled, and the state to resume from, if there is one."""
     if policy.checkpoint is None:
         if policy.resume:

@@ -19,9 +19,9 @@ def write_past_cache(handle: int, pieces: Iterable[bytes | memoryview]) -> None:
     """Write the pieces of bytes one after another to an open file, positioned at its beginning. Raises OSError if that
     fails; the data is on disk only after `os.fsync`."""
     direct = _set_direct(handle, True)
-    with mmap.mmap(-1, CHUNK) as memory, memoryview(memory) as chunk:    # page-aligned, as O_DIRECT requires
+    with mmap.mmap(-1, CHUNK) as memory, memoryview(memory) as chunk:  # page-aligned, as O_DIRECT requires
         for size in _filled(chunk, pieces):
-            if direct and size < CHUNK:    # the last one
+            if direct and size < CHUNK:  # the last one
                 direct = _set_direct(handle, False)
             done = 0
             while done < size:
@@ -30,7 +30,7 @@ def write_past_cache(handle: int, pieces: Iterable[bytes | memoryview]) -> None:
                 except OSError as error:
                     if not direct or error.errno != errno.EINVAL:
                         raise
-                    direct = _set_direct(handle, False)    # some systems refuse only now
+                    direct = _set_direct(handle, False)  # some systems refuse only now
 
 
 def _filled(chunk: memoryview, pieces: Iterable[bytes | memoryview]) -> Iterator[int]:
@@ -40,7 +40,7 @@ def _filled(chunk: memoryview, pieces: Iterable[bytes | memoryview]) -> Iterator
         done = 0
         while done < len(piece):
             taken = min(CHUNK - there, len(piece) - done)
-            chunk[there:there + taken] = memoryview(piece)[done:done + taken]
+            chunk[there : there + taken] = memoryview(piece)[done : done + taken]
             done, there = done + taken, there + taken
             if there == CHUNK:
                 yield there

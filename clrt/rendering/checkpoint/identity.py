@@ -50,9 +50,13 @@ def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
     """Return each setting as text, and the SHA-256 of each part of the scene, of the kernels and of the code."""
     width, height = scene.render.size
     values = {**values_of(scene.render, choices), "size": f"{width}x{height}"}
-    return {"version": version("clrt"), "kernels": kernel_digest(), "code": code_digest(),
-            **{name: str(value) for name, value in values.items()},
-            **{part: _digest(_part(scene, part)) for part in parts_of(scene)}}
+    return {
+        "version": version("clrt"),
+        "kernels": kernel_digest(),
+        "code": code_digest(),
+        **{name: str(value) for name, value in values.items()},
+        **{part: _digest(_part(scene, part)) for part in parts_of(scene)},
+    }
 
 
 def values_of(settings: RenderSettings, choices: Choices) -> dict[str, Any]:

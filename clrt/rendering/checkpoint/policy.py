@@ -13,8 +13,11 @@ class CheckpointPolicy:
     """When a render writes checkpoints, and whether it resumes from one (docs/checkpoints.md)."""
 
     checkpoint: StrPath | None = option(
-        None, "Save the state there regularly, so that a render can resume; FILE~ is the previous one.")
+        None, "Save the state there regularly, so that a render can resume; FILE~ is the previous one."
+    )
     resume: bool = option(
-        False, "Resume from the checkpoint, with the spp planned then; start afresh if it does not exist yet.")
+        False, "Resume from the checkpoint, with the spp planned then; start afresh if it does not exist yet."
+    )
     checkpoint_seconds: float = option(
-        30.0, "Time between checkpoints; longer if they would take more than 2 % of the time.")
+        30.0, "Time between checkpoints; longer if they would take more than 2 % of the time."
+    )

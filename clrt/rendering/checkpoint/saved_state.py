@@ -17,10 +17,17 @@ from .checkpoint_file import Arrays
 #: Columns of a history, NaN for values that an entry lacks.
 HISTORY = ("spp", "seconds", "noise", "relmse")
 KINDS: dict[str, np.dtype[Any]] = {
-    "film": PIXEL, "direct": DIRECT, "samples": np.dtype(np.int64), "then": np.dtype(np.int64),
+    "film": PIXEL,
+    "direct": DIRECT,
+    "samples": np.dtype(np.int64),
+    "then": np.dtype(np.int64),
     "tiles": np.dtype(np.uint32),
-    "parts": np.dtype(np.int64), "noise_mean": np.dtype(np.float32), "noise_changes": np.dtype(np.float64),
-    "noise_level": np.dtype(np.int64), "history": np.dtype(np.float64)}
+    "parts": np.dtype(np.int64),
+    "noise_mean": np.dtype(np.float32),
+    "noise_changes": np.dtype(np.float64),
+    "noise_level": np.dtype(np.int64),
+    "history": np.dtype(np.float64),
+}
 MOST_SAMPLES = 1 << 32
 NO_SENSE = "is damaged: its parts are inconsistent"
 
@@ -41,18 +48,33 @@ def to_arrays(kept: SavedState) -> Arrays:
     """Return arrays as in KINDS. parts: (k, 4); history: (n, 4), see HISTORY; others: see Work and NoiseEstimate."""
     work, (mean, changes, level) = kept.work, kept.noise.arrays()
     rows = [[np.nan if entry.get(name) is None else entry[name] for name in HISTORY] for entry in kept.history]
-    arrays = {**_film_parts(kept.film), "samples": work.samples, "then": work.then, "tiles": work.tiles,
-              "parts": np.array(work.parts).reshape(-1, 4), "noise_mean": mean, "noise_changes": changes,
-              "noise_level": level, "history": np.array(rows).reshape(-1, 4)}
+    arrays = {
+        **_film_parts(kept.film),
+        "samples": work.samples,
+        "then": work.then,
+        "tiles": work.tiles,
+        "parts": np.array(work.parts).reshape(-1, 4),
+        "noise_mean": mean,
+        "noise_changes": changes,
+        "noise_level": level,
+        "history": np.array(rows).reshape(-1, 4),
+    }
     return {name: arrays[name].astype(kind, copy=False) for name, kind in KINDS.items()}
 
 
 def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -> SavedState:
     """Return the saved state of an image of (width, height). Raises ValueError if the parts are inconsistent."""
     planned, seconds = header.get("planned_spp"), header.get("seconds")
-    if not (planned is None or type(planned) is int and planned > 0) or type(seconds) is not float or not (
-            0 <= seconds < np.inf and _film_fits(header, arrays, size) and _work_fits(arrays, size)
-            and _noise_fits(arrays, size)):
+    if (
+        not (planned is None or type(planned) is int and planned > 0)
+        or type(seconds) is not float
+        or not (
+            0 <= seconds < np.inf
+            and _film_fits(header, arrays, size)
+            and _work_fits(arrays, size)
+            and _noise_fits(arrays, size)
+        )
+    ):
         raise ValueError(NO_SENSE)
     work = WorkQueue(arrays["samples"], arrays["then"], arrays["tiles"], map(WorkPart._make, arrays["parts"].tolist()))
     noise = NoiseEstimate(planned)
@@ -86,12 +108,19 @@ def _film_fits(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) ->
 def _work_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
     """Return whether the work has this size, and no launch would exceed the film or 2³² samples."""
     samples, then, tiles, parts = (arrays[name] for name in ("samples", "then", "tiles", "parts"))
-    return bool(samples.shape == then.shape == tiles_of(size)
-                and np.all((0 <= samples) & (samples <= then) & (then <= MOST_SAMPLES))
-                and tiles.ndim == 1 and np.all(tiles < samples.size) and parts.shape[1:] == (4,)
-                and all(0 <= part.first < part.end <= len(tiles) and 0 <= part.samples < MOST_SAMPLES
-                        and 0 < part.more <= MOST_SAMPLES - part.samples
-                        for part in map(WorkPart._make, parts.tolist())))
+    return bool(
+        samples.shape == then.shape == tiles_of(size)
+        and np.all((0 <= samples) & (samples <= then) & (then <= MOST_SAMPLES))
+        and tiles.ndim == 1
+        and np.all(tiles < samples.size)
+        and parts.shape[1:] == (4,)
+        and all(
+            0 <= part.first < part.end <= len(tiles)
+            and 0 <= part.samples < MOST_SAMPLES
+            and 0 < part.more <= MOST_SAMPLES - part.samples
+            for part in map(WorkPart._make, parts.tolist())
+        )
+    )
 
 
 def _noise_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
@@ -99,6 +128,11 @@ def _noise_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
     mean, changes, level = (arrays[name] for name in ("noise_mean", "noise_changes", "noise_level"))
     shapes = [(*size[::-1], 3), tiles_of(size)] if mean.size else [(0, 0, 3), (0, 0)]
     history = arrays["history"]
-    return bool([mean.shape, level.shape] == shapes and changes.shape[1:] == (2, *level.shape) and len(changes) <= 64
-                and np.all((-1 <= level) & (level <= len(changes)))
-                and history.shape[1:] == (4,) and np.all(np.isfinite(history[:, :2])))
+    return bool(
+        [mean.shape, level.shape] == shapes
+        and changes.shape[1:] == (2, *level.shape)
+        and len(changes) <= 64
+        and np.all((-1 <= level) & (level <= len(changes)))
+        and history.shape[1:] == (4,)
+        and np.all(np.isfinite(history[:, :2]))
+    )

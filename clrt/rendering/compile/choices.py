@@ -34,31 +34,39 @@ class Choices:
     """
 
     lanes: int | None = option(None, "SIMD width: paths per work-item.", LANES)
-    layout: str | None = option(
-        None, "BVH layout; packs (for small scenes) and list use no BVH.", get_args(LayoutName))
+    layout: str | None = option(None, "BVH layout; packs (for small scenes) and list use no BVH.", get_args(LayoutName))
     builder: str | None = option(
-        None, "BVH builder; default: sah for small scenes, ploc on the device for large ones.", get_args(BuilderName))
+        None, "BVH builder; default: sah for small scenes, ploc on the device for large ones.", get_args(BuilderName)
+    )
     tests: HitTests = HitTests()
     offset: str = option(
-        "bound", "Offset of ray origins from the surface: its rounding error bound, a few ulps, or 0.001.", OFFSETS)
+        "bound", "Offset of ray origins from the surface: its rounding error bound, a few ulps, or 0.001.", OFFSETS
+    )
     direct_light: bool = False
     paths: str | None = option(
-        None, "lanes: megakernel; waves: wavefront with compaction (needs 8 lanes). Default: by device.",
-        get_args(Paths))
+        None,
+        "lanes: megakernel; waves: wavefront with compaction (needs 8 lanes). Default: by device.",
+        get_args(Paths),
+    )
     tree: bool | None = option(
-        None, "Use a BVH, or intersect every ray with all primitives (brute force); default: the faster.",
-        (True, False))
+        None, "Use a BVH, or intersect every ray with all primitives (brute force); default: the faster.", (True, False)
+    )
     first_hits: bool = option(
-        False, "Whether first hits will be requested later, as AOVs, by a denoiser or by a user: then rays are traced "
-               "whatever the integrator does.", (True, False))
+        False,
+        "Whether first hits will be requested later, as AOVs, by a denoiser or by a user: then rays are traced "
+        "whatever the integrator does.",
+        (True, False),
+    )
 
     def __post_init__(self) -> None:
         check_values(self)
         if self.paths == "waves" and self.lanes not in (None, WAVE_LANES):
             raise UsageError(f"paths = waves needs {WAVE_LANES} lanes, not {self.lanes}; leave out one of them")
         if self.tree is not None and self.layout is not None and self.tree == (self.layout in TREELESS):
-            raise UsageError(f"the layout {self.layout} is {'not ' * self.tree}a BVH, and tree is "
-                             f"{'on' if self.tree else 'off'}; leave out one of them")
+            raise UsageError(
+                f"the layout {self.layout} is {'not ' * self.tree}a BVH, and tree is "
+                f"{'on' if self.tree else 'off'}; leave out one of them"
+            )
 
     @property
     def pixel(self) -> np.dtype[Any]:

@@ -36,17 +36,21 @@ def begin_program(scene: Scene, choices: Choices, device: Device, source: Callab
     count, spheres = sum(len(mesh.faces) for mesh in scene.meshes), len(scene.spheres)
     in_tree = spheres if spheres > FEW_SPHERES else 0
     layout = choices.layout or fitting_layout(device, count, in_tree, choices.tests.triangle, False, choices.tree)
-    with suppress(ClrtError):   # errors are reported by the regular compilation
+    with suppress(ClrtError):  # errors are reported by the regular compilation
         outlined = outline(scene)
         builder = builder_source(device, layout, choices.builder, count, in_tree)
-        if (builder is None or is_kept(device, builder) or PACKED * _bytes(scene) > LARGE
-                or sum(len(mesh.faces) for mesh in outlined.meshes) + spheres > MOST):
+        if (
+            builder is None
+            or is_kept(device, builder)
+            or PACKED * _bytes(scene) > LARGE
+            or sum(len(mesh.faces) for mesh in outlined.meshes) + spheres > MOST
+        ):
             return
         beside(lambda: _compile(device, outlined, replace(choices, layout=layout), source), daemon=True)
 
 
 def _compile(device: Device, outlined: Scene, choices: Choices, source: Callable[[Scene, Choices], str]) -> None:
-    with suppress(ClrtError):   # the error recurs in the regular compilation
+    with suppress(ClrtError):  # the error recurs in the regular compilation
         compile_ahead(device, source(outlined, choices))
 
 
@@ -57,20 +61,25 @@ def _processors() -> int:
 
 def outline(scene: Scene) -> Scene:
     """Return the scene with each mesh that is not emissive reduced to one triangle."""
-    return replace(scene, meshes=[mesh if any(mesh.material.radiance) else _one_triangle(mesh)
-                                  for mesh in scene.meshes])
+    return replace(
+        scene, meshes=[mesh if any(mesh.material.radiance) else _one_triangle(mesh) for mesh in scene.meshes]
+    )
 
 
 def _one_triangle(mesh: Mesh) -> Mesh:
     arrays: dict[str, Any] = {name: getattr(mesh, name) for name in PER_VERTEX}
-    return replace(mesh, faces=np.arange(3, dtype=np.int32)[None],
-                   **{name: values[mesh.faces[0]] for name, values in arrays.items() if values is not None})
+    return replace(
+        mesh,
+        faces=np.arange(3, dtype=np.int32)[None],
+        **{name: values[mesh.faces[0]] for name, values in arrays.items() if values is not None},
+    )
 
 
 def _bytes(scene: Scene) -> int:
     """Return the size of its arrays, which are packed twice."""
-    arrays: list[NDArray[Any] | None] = [getattr(mesh, name) for mesh in scene.meshes
-                                         for name in ("faces", *PER_VERTEX)]
+    arrays: list[NDArray[Any] | None] = [
+        getattr(mesh, name) for mesh in scene.meshes for name in ("faces", *PER_VERTEX)
+    ]
     materials = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
     arrays += [p.texels for p in {texture.picture for each in materials for texture in each.textures()}]
     arrays.append(scene.environment.image)

@@ -76,8 +76,9 @@ class CompiledScene:
 
     def has_text_of(self, other: CompiledScene) -> bool:
         """Return whether both have the same program, with arrays split into the same parts."""
-        return all(getattr(self, name) == getattr(other, name)
-                   for name in ("preamble", "chosen_files", "entry", "part_bytes"))
+        return all(
+            getattr(self, name) == getattr(other, name) for name in ("preamble", "chosen_files", "entry", "part_bytes")
+        )
 
     @property
     def kernel(self) -> str:
@@ -101,9 +102,14 @@ class CompiledScene:
         return sum(array_bytes(array, self.part_bytes) for _, array in self.buffers.values())
 
 
-def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
-                  device: Device | None = None, carried: ReuseCache | None = None,
-                  ahead: bool = False) -> CompiledScene:
+def compile_scene(
+    scene: Scene,
+    choices: Choices,
+    entry: str | None = None,
+    device: Device | None = None,
+    carried: ReuseCache | None = None,
+    ahead: bool = False,
+) -> CompiledScene:
     """Validate and pack `scene` for the kernel file `entry`. Raises SceneError listing everything that is wrong with
     it.
 
@@ -121,8 +127,19 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
         integrator = scene.render.integrator
         in_waves = integrator in WITH_LIGHT and choices.paths == "waves" and "LOOP_LIMIT" not in features
         entry = RASTER if integrator == "raster" else WAVEFRONT if in_waves else MEGAKERNEL
-    return CompiledScene(packed.buffers, packed.counts, sorted(features),
-                         preamble_of(packed, choices, features, part_bytes), files_for(packed, choices, features),
-                         entry, packed.tree, choices, packed.scene.camera, packed.frame,
-                         len(packed.scene.instances), packed.shapes.objects, part_bytes,
-                         (scene.render.clamp_direct or inf, scene.render.clamp_indirect or inf))
+    return CompiledScene(
+        packed.buffers,
+        packed.counts,
+        sorted(features),
+        preamble_of(packed, choices, features, part_bytes),
+        files_for(packed, choices, features),
+        entry,
+        packed.tree,
+        choices,
+        packed.scene.camera,
+        packed.frame,
+        len(packed.scene.instances),
+        packed.shapes.objects,
+        part_bytes,
+        (scene.render.clamp_direct or inf, scene.render.clamp_indirect or inf),
+    )

@@ -21,8 +21,12 @@ from .records import COUNTS, GUIDE, LAUNCH, OUTLINE
 #: Path-tracing integrators, and the kernel files of the integrators that compute light; others show first hits
 #: (kernels/integrator/first_surface.cl).
 WITH_LIGHT = ("path", "direct")
-INTEGRATORS = {"path": "integrator/path.cl", "direct": "integrator/path.cl", "local": "integrator/local.cl",
-               "raster": "integrator/local.cl"}
+INTEGRATORS = {
+    "path": "integrator/path.cl",
+    "direct": "integrator/path.cl",
+    "local": "integrator/local.cl",
+    "raster": "integrator/local.cl",
+}
 
 
 def biased_by(settings: RenderSettings) -> list[str]:
@@ -41,22 +45,33 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
     features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
     features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
     features |= set().union(emitters.features, *(material.features() for material in packed.shapes.users))
-    has = {**tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone, packed.tree is not NO_RAYS),
-           "SPHERES": bool(scene.spheres), "INSTANCES": bool(scene.instances),
-           "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes),
-           "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),
-           "TEXTURES": packed.uv_sets > 0, "NORMAL_MAPS": materials.normal_maps,
-           "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in packed.shapes.users),
-           "OPACITY": bool(materials.with_value("opacity")), "NEXT_HIT": bool(materials.with_value("opacity")),
-           "SKY": packed.sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
-           "EMITTERS": any(t in SURFACES for t in emitters.types),
-           "DOUBLE_SIDED_LIGHTS": any(user.double_sided and any(user.radiance) for user in packed.shapes.users),
-           "LOCAL": local, "NO_SHADOWS": local and not scene.render.shadows,
-           "RASTER": scene.render.integrator == "raster", "PIXEL_MIDDLE": scene.render.integrator == "depth",
-           "CAMERA_CULLING": (scene.render.back_face_culling == "camera"
-                              and any(user.is_culled for user in packed.shapes.users)),
-           "CLAMP": bool(biased_by(scene.render)),
-           "DIRECT_LIGHT": choices.direct_light, "LOOP_LIMIT": loop_limit}
+    has = {
+        **tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone, packed.tree is not NO_RAYS),
+        "SPHERES": bool(scene.spheres),
+        "INSTANCES": bool(scene.instances),
+        "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes),
+        "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),
+        "TEXTURES": packed.uv_sets > 0,
+        "NORMAL_MAPS": materials.normal_maps,
+        "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in packed.shapes.users),
+        "OPACITY": bool(materials.with_value("opacity")),
+        "NEXT_HIT": bool(materials.with_value("opacity")),
+        "SKY": packed.sky.kernel is not None,
+        "LIGHTS": emitters.count > 0,
+        "LIGHT_TREE": emitters.choice.tree,
+        "EMITTERS": any(t in SURFACES for t in emitters.types),
+        "DOUBLE_SIDED_LIGHTS": any(user.double_sided and any(user.radiance) for user in packed.shapes.users),
+        "LOCAL": local,
+        "NO_SHADOWS": local and not scene.render.shadows,
+        "RASTER": scene.render.integrator == "raster",
+        "PIXEL_MIDDLE": scene.render.integrator == "depth",
+        "CAMERA_CULLING": (
+            scene.render.back_face_culling == "camera" and any(user.is_culled for user in packed.shapes.users)
+        ),
+        "CLAMP": bool(biased_by(scene.render)),
+        "DIRECT_LIGHT": choices.direct_light,
+        "LOOP_LIMIT": loop_limit,
+    }
     has["HORIZON"] = has["SMOOTH_NORMALS"] or has["NORMAL_MAPS"]
     return features | {name for name, present in has.items() if present}
 
@@ -69,24 +84,27 @@ def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str
     unit = {"SCENE_UNIT": packed.frame.unit} if lengths else {}
     surfaces = [t for t in emitters.types if t in SURFACES]
     rasterised = [typedefs({"Outline": OUTLINE}), defines({"FILTER_REACH": filter_reach(packed.scene.render.filter)})]
-    return "\n".join([
-        defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(packed.tree), **unit}),
-        defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
-        defines({feature: 1 for feature in sorted(features)}),
-        typedefs({"Counts": COUNTS, "Pixel": choices.pixel, "Guide": GUIDE, "Launch": LAUNCH}),
-        scene_struct(packed.buffers, part_bytes),
-        type_list("MATERIAL_TYPES", _numbered(materials.used)),
-        type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),
-        type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),
-        type_list("COAT_MAPPED_TYPES", _numbered(materials.mapped("clearcoat_normal_map"))),
-        type_list("COATED_TYPES", _numbered(materials.featured("COAT_NORMALS"))),
-        type_list("SPREADING_TYPES", _numbered(materials.featured("TRANSMISSION_LOBES"))),
-        type_list("ABSORBING_TYPES", _numbered(materials.featured("ATTENUATION"))),
-        defines({"UV_SETS": packed.uv_sets}),
-        *(f"#define READ_{name} {'TEXTURED' if reads else 'CONSTANT'}" for name, reads in materials.reads.items()),
-        type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),
-        type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces]),
-        *(rasterised if "RASTER" in features else [])])
+    return "\n".join(
+        [
+            defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(packed.tree), **unit}),
+            defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
+            defines({feature: 1 for feature in sorted(features)}),
+            typedefs({"Counts": COUNTS, "Pixel": choices.pixel, "Guide": GUIDE, "Launch": LAUNCH}),
+            scene_struct(packed.buffers, part_bytes),
+            type_list("MATERIAL_TYPES", _numbered(materials.used)),
+            type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),
+            type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),
+            type_list("COAT_MAPPED_TYPES", _numbered(materials.mapped("clearcoat_normal_map"))),
+            type_list("COATED_TYPES", _numbered(materials.featured("COAT_NORMALS"))),
+            type_list("SPREADING_TYPES", _numbered(materials.featured("TRANSMISSION_LOBES"))),
+            type_list("ABSORBING_TYPES", _numbered(materials.featured("ATTENUATION"))),
+            defines({"UV_SETS": packed.uv_sets}),
+            *(f"#define READ_{name} {'TEXTURED' if reads else 'CONSTANT'}" for name, reads in materials.reads.items()),
+            type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),
+            type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces]),
+            *(rasterised if "RASTER" in features else []),
+        ]
+    )
 
 
 def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict[str, list[str]]:
@@ -94,24 +112,34 @@ def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict
     scene, emitters, sky = packed.scene, packed.emitters, packed.sky
     integrator, lights = scene.render.integrator, [f"light/{t}.cl" for t in emitters.types if t != "sky"]
     parts = sorted({part for kind in packed.materials.used for part in kind.parts})
-    return {**tree_files(packed.tree.name, choices.tests, bool(scene.meshes), bool(scene.spheres), packed.shapes.lone,
-                         bool(scene.instances)),
-            **{f"{part}_FILE": [f"bsdf/{part.lower()}.cl"] if part in features else [] for part in parts},
-            "PLACEMENT_FILE": ["surface/instance_transform.cl"] if scene.instances else [],
-            "OFFSET": [OFFSETS[choices.offset]],
-            "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in packed.materials.used],
-            "LIGHT_CHOICE": emitters.choice.files, "MIS_WEIGHTS": ["integrator/mis.cl"],
-            "LIGHT_TREE_FILE": ["light/tree.cl"] if emitters.choice.tree else [],
-            "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else []),
-            "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
-            "OPACITY_FILE": ["surface/opacity.cl"] if "OPACITY" in features else [],
-            "TEXTURE_FILES": ["surface/texture.cl"] if packed.uv_sets else [],
-            "NORMAL_MAPS_FILE": ["surface/normal_maps.cl"] if packed.materials.normal_maps else [],
-            "HORIZON_FILE": ["surface/horizon.cl"] if "HORIZON" in features else [],
-            "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(scene.camera, integrator)],
-            "FILTER": ["film/box_filter.cl" if scene.render.filter == "box" else "film/table_filter.cl"],
-            "INTEGRATOR": [INTEGRATORS.get(integrator, "integrator/first_surface.cl")],
-            "PICTURE": [f"integrator/first_surface_{integrator}.cl"]}
+    return {
+        **tree_files(
+            packed.tree.name,
+            choices.tests,
+            bool(scene.meshes),
+            bool(scene.spheres),
+            packed.shapes.lone,
+            bool(scene.instances),
+        ),
+        **{f"{part}_FILE": [f"bsdf/{part.lower()}.cl"] if part in features else [] for part in parts},
+        "PLACEMENT_FILE": ["surface/instance_transform.cl"] if scene.instances else [],
+        "OFFSET": [OFFSETS[choices.offset]],
+        "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in packed.materials.used],
+        "LIGHT_CHOICE": emitters.choice.files,
+        "MIS_WEIGHTS": ["integrator/mis.cl"],
+        "LIGHT_TREE_FILE": ["light/tree.cl"] if emitters.choice.tree else [],
+        "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else []),
+        "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
+        "OPACITY_FILE": ["surface/opacity.cl"] if "OPACITY" in features else [],
+        "TEXTURE_FILES": ["surface/texture.cl"] if packed.uv_sets else [],
+        "NORMAL_MAPS_FILE": ["surface/normal_maps.cl"] if packed.materials.normal_maps else [],
+        "HORIZON_FILE": ["surface/horizon.cl"] if "HORIZON" in features else [],
+        "SAMPLER": [f"sampler/{scene.render.sampler}.cl"],
+        "CAMERA": [camera_file(scene.camera, integrator)],
+        "FILTER": ["film/box_filter.cl" if scene.render.filter == "box" else "film/table_filter.cl"],
+        "INTEGRATOR": [INTEGRATORS.get(integrator, "integrator/first_surface.cl")],
+        "PICTURE": [f"integrator/first_surface_{integrator}.cl"],
+    }
 
 
 def _numbered(kinds: Iterable[type[Material]]) -> list[tuple[str, int]]:

@@ -53,28 +53,42 @@ class Shapes:
     @cached_property
     def users(self) -> list[Material]:
         """Materials of meshes, spheres and instances."""
-        return [*(mesh.material for mesh in self.scene.meshes), *(sphere.material for sphere in self.scene.spheres),
-                *self.placements.materials]
+        return [
+            *(mesh.material for mesh in self.scene.meshes),
+            *(sphere.material for sphere in self.scene.spheres),
+            *self.placements.materials,
+        ]
 
     def _follows_rays(self, choices: Choices) -> bool:
         """Return whether rays are traced: `raster` traces only shadow rays and those of mirrors, glass and cut-outs."""
         render = self.scene.render
-        return (render.integrator != "raster" or render.shadows or choices.first_hits
-                or any(user.is_specular or "TRANSMISSION" in user.features()
-                       or "opacity" in user.surface_parameters(render.back_face_culling) for user in self.users))
+        return (
+            render.integrator != "raster"
+            or render.shadows
+            or choices.first_hits
+            or any(
+                user.is_specular
+                or "TRANSMISSION" in user.features()
+                or "opacity" in user.surface_parameters(render.back_face_culling)
+                for user in self.users
+            )
+        )
 
     def tree(self, choices: Choices, device: Device | None, carried: ReuseCache) -> Layout:
         """Return the BVH over everything but lone spheres; NO_RAYS if none is needed."""
         if not self._follows_rays(choices):
             return NO_RAYS
         in_tree, test = self.spheres[:0] if self.lone else self.spheres, choices.tests.triangle
-        layout = choices.layout or fitting_layout(device, len(self.triangles), len(in_tree), test,
-                                                  bool(self.scene.instances), choices.tree)
-        return carried.tree(device, layout, choices.builder, self.scene.meshes, self.triangles, in_tree, test,
-                            self.placements)
+        layout = choices.layout or fitting_layout(
+            device, len(self.triangles), len(in_tree), test, bool(self.scene.instances), choices.tree
+        )
+        return carried.tree(
+            device, layout, choices.builder, self.scene.meshes, self.triangles, in_tree, test, self.placements
+        )
 
-    def buffers(self, codes: NDArray[np.int32], emitters: PackedLights, normals: NDArray[Any],
-                rays: bool) -> dict[str, tuple[str, Any]]:
+    def buffers(
+        self, codes: NDArray[np.int32], emitters: PackedLights, normals: NDArray[Any], rays: bool
+    ) -> dict[str, tuple[str, Any]]:
         """Return the buffers of the surfaces; codes: of the users' materials; rays: whether any are traced."""
         meshes, spheres = self.scene.meshes, self.spheres
         of_meshes, of_spheres, of_instances = np.split(codes, np.cumsum([len(meshes), len(spheres)]))
@@ -121,11 +135,11 @@ class PackedScene:
 def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: ReuseCache) -> PackedScene:
     """Pack a valid scene; device: where large BVHs are built, if given; carried: cache from the previous scene."""
     shapes = Shapes(scene)
-    packing = beside(lambda: carried.sky(scene.environment))    # takes as long as a BVH build; neither uses all cores
+    packing = beside(lambda: carried.sky(scene.environment))  # takes as long as a BVH build; neither uses all cores
     try:
         tree = shapes.tree(choices, device, carried)
         normals = normal_records(shapes.scene.meshes)
-    finally:    # else it could replace the next scene's environment
+    finally:  # else it could replace the next scene's environment
         sky = packing()
     textures, tables = PackedTextures(), MaterialTables()
     emitters = pack_emitters(shapes.scene, sky, textures)

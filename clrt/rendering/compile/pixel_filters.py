@@ -38,7 +38,10 @@ def _gaussian(t: Doubles) -> Doubles:
 
 #: Radius in pixels, and cumulative distribution function over [−1, 1].
 FILTERS: dict[str, tuple[float, Callable[[Doubles], Doubles]]] = {
-    "tent": (1.0, _tent), "blackman_harris": (1.5, _blackman_harris), "gaussian": (2.0, _gaussian)}
+    "tent": (1.0, _tent),
+    "blackman_harris": (1.5, _blackman_harris),
+    "gaussian": (2.0, _gaussian),
+}
 
 
 def filter_quantiles(name: str) -> NDArray[np.void]:

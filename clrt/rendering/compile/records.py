@@ -19,20 +19,33 @@ TANGENTS = record(t0="3f4", sign="f4", t1="3f4", pad1="f4", t2="3f4", pad2="f4")
 SPHERE = record(center="3f4", radius="f4", material="i4", light="i4", pad="2i4")
 #: An instance (kernels/surface/instance_transform.cl). first: its mesh's first triangle; material: a code, or −1 for
 #: the triangles' own; unit: 1 over the greatest entry of the matrix, negative if it mirrors.
-PLACEMENT = record(to_world="(3,4)f4", rounding0="3f4", first="i4", rounding1="3f4", material="i4", rounding2="3f4",
-                   unit="f4")
+PLACEMENT = record(
+    to_world="(3,4)f4", rounding0="3f4", first="i4", rounding1="3f4", material="i4", rounding2="3f4", unit="f4"
+)
 
 #: A light, a group of lights, or an infinite light (kernels/light/choice.cl, tree.cl).
-LIGHT_GROUP = record(center="3f4", radius="f4", axis="3f4", cos_cone="f4", intensity="f4", below="i4", above="i4",
-                     cos_reach="f4")
+LIGHT_GROUP = record(
+    center="3f4", radius="f4", axis="3f4", cos_cone="f4", intensity="f4", below="i4", above="i4", cos_reach="f4"
+)
 LIGHT_PLACE = np.dtype([("group", "i4")])
 #: texture: of its radiance, or −1; primitive: the triangle with its texture coordinates; double_sided: 1 if it emits
 #: from both sides.
-TRIANGLE_LIGHT = record(p0="3f4", area="f4", e1="3f4", parallelogram="i4", e2="3f4", texture="i4", normal="3f4",
-                        primitive="i4", radiance="3f4", double_sided="i4")
+TRIANGLE_LIGHT = record(
+    p0="3f4",
+    area="f4",
+    e1="3f4",
+    parallelogram="i4",
+    e2="3f4",
+    texture="i4",
+    normal="3f4",
+    primitive="i4",
+    radiance="3f4",
+    double_sided="i4",
+)
 #: sphere: its number among the spheres.
-SPHERE_LIGHT = record(center="3f4", radius="f4", radiance="3f4", texture="i4", sphere="i4", double_sided="i4",
-                      pad="2i4")
+SPHERE_LIGHT = record(
+    center="3f4", radius="f4", radiance="3f4", texture="i4", sphere="i4", double_sided="i4", pad="2i4"
+)
 
 ENVIRONMENT = record(color="3f4", pad="f4", width="i4", height="i4", rotation_cos="f4", rotation_sin="f4")
 SKY_TEXEL = record(radiance="3f4", density="f4")
@@ -42,14 +55,41 @@ SKY_STEP = np.dtype([("top", "f4"), ("start", "i4")])
 _COUNTED = ("triangles", "spheres", "lights", *(f"{kind}_lights" for kind in TYPES))
 COUNTS = record(**dict.fromkeys(_COUNTED, "i4"), pad=f"({-len(_COUNTED) % 4 or 4},)i4")
 #: clamped: if CLAMP is compiled in, the radiance that clamping removed from the samples, averaged over channels.
-PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4", rays="u4", square_error="3f4",
-               clamped="f4")
-LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", max_depth="i4", forward="3f4",
-                seed="u4", first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4",
-                block_bits="u4", lens_radius="f4", clamp_direct="f4", clamp_indirect="f4")
+PIXEL = record(
+    sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4", rays="u4", square_error="3f4", clamped="f4"
+)
+LAUNCH = record(
+    position="3f4",
+    width="u4",
+    right="3f4",
+    height="u4",
+    up="3f4",
+    max_depth="i4",
+    forward="3f4",
+    seed="u4",
+    first_pixel="u4",
+    pixel_count="u4",
+    first_sample="u4",
+    sample_count="u4",
+    block_bits="u4",
+    lens_radius="f4",
+    clamp_direct="f4",
+    clamp_indirect="f4",
+)
 #: u_row, v_row: rows that map (u, v, 1) to the image's coordinates. first: of its texels.
-TEXTURE = record(u_row="3f4", width="i4", v_row="3f4", height="i4", first="i4", wrap_u="i4", wrap_v="i4", nearest="i4",
-                 uv_set="i4", shift="u4", pad="2i4")
+TEXTURE = record(
+    u_row="3f4",
+    width="i4",
+    v_row="3f4",
+    height="i4",
+    first="i4",
+    wrap_u="i4",
+    wrap_v="i4",
+    nearest="i4",
+    uv_set="i4",
+    shift="u4",
+    pad="2i4",
+)
 TEXEL = np.dtype([("rgba", "u4")])
 #: Linear value of an sRGB-encoded byte.
 LINEAR = np.dtype([("linear", "f4")])
@@ -60,8 +100,9 @@ DIRECT = record(direct="3f4", pad0="u4", direct_error="3f4", pad1="u4")
 PIXEL_WITH_DIRECT = np.dtype([*PIXEL.descr, *DIRECT.descr])
 #: A projected primitive (kernels/raster/outline.cl). edge0 … nearness: functions of the image position, or for a sphere
 #: its center and radius; instance: negative for spheres; rows: range of pixel rows that it may cover.
-OUTLINE = record(edge0="3f4", primitive="i4", edge1="3f4", instance="i4", edge2="3f4", first_row="i4", nearness="3f4",
-                 last_row="i4")
+OUTLINE = record(
+    edge0="3f4", primitive="i4", edge1="3f4", instance="i4", edge2="3f4", first_row="i4", nearness="3f4", last_row="i4"
+)
 #: An entry of the layer energy tables (clrt/scene/materials/layer_energy.py).
 LAYER_PARTS = record(part="8f4")
 #: A filter's quantile, in pixels from a pixel's edge.

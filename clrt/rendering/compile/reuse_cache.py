@@ -20,8 +20,8 @@ FloatArray = NDArray[np.float32]
 
 
 class ReuseCache:
-    """Cache of the last BVH and environment. If only instances moved, the BVH buffers are updated, also on the device.
-    """
+    """Cache of the last BVH and environment. If only instances moved, the BVH buffers are updated, also on the
+    device."""
 
     def __init__(self) -> None:
         self._environment: Environment | None = None
@@ -38,8 +38,17 @@ class ReuseCache:
             self._sky, self._environment = pack_sky(environment), environment
         return self._sky
 
-    def tree(self, device: Device | None, layout: str, builder: str | None, meshes: list[Mesh], triangles: Triangles,
-             spheres: FloatArray, test: str, placements: PackedInstances) -> Layout:
+    def tree(
+        self,
+        device: Device | None,
+        layout: str,
+        builder: str | None,
+        meshes: list[Mesh],
+        triangles: Triangles,
+        spheres: FloatArray,
+        test: str,
+        placements: PackedInstances,
+    ) -> Layout:
         """Return the BVH over the meshes' triangles and spheres (s, 4), and over instances if there are any."""
         names = layout, builder, test, len(placements.materials), len(meshes)
         arrays = [spheres, placements.mesh, placements.starts]  # meshes' arrays are half as large as triangles

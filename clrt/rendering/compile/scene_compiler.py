@@ -52,16 +52,23 @@ class SceneCompiler:
         """Compile once for devices with equal properties, unless BVHs were built on a device."""
         compiled: list[CompiledScene] = []
         for device, carried in zip(self.devices, self._carried):
-            alike = [done for done, other in zip(compiled, self.devices) if done.choices == choices.on(device)
-                     and (other.layout, other.info.max_alloc_bytes) == (device.layout, device.info.max_alloc_bytes)
-                     and all(isinstance(array, np.ndarray) for _, array in done.buffers.values())]
-            compiled.append(alike[0] if alike else compile_scene(scene, choices, device=device, carried=carried,
-                                                                 ahead=ahead))
+            alike = [
+                done
+                for done, other in zip(compiled, self.devices)
+                if done.choices == choices.on(device)
+                and (other.layout, other.info.max_alloc_bytes) == (device.layout, device.info.max_alloc_bytes)
+                and all(isinstance(array, np.ndarray) for _, array in done.buffers.values())
+            ]
+            compiled.append(
+                alike[0] if alike else compile_scene(scene, choices, device=device, carried=carried, ahead=ahead)
+            )
         return compiled
 
 
 def _differs_in_passing(scene: Scene, last: Scene) -> bool:
     """Return whether at most the camera and PASSING settings differ."""
     passing = {name: getattr(last.render, name) for name in PASSING}
-    return (all(getattr(scene, name) is getattr(last, name) for name in parts_of(scene) if name != "camera")
-            and replace(scene.render, **passing) == last.render)
+    return (
+        all(getattr(scene, name) is getattr(last, name) for name in parts_of(scene) if name != "camera")
+        and replace(scene.render, **passing) == last.render
+    )

@@ -27,21 +27,23 @@ def most_planned(spp: int | None, adaptive: bool) -> int | None:
     return None if spp is None else int(spp) * (MOST_TIMES_PLANNED if adaptive else 1)
 
 
-def tiles_to_double(film: Film, tile_samples: NDArray[np.int64], errors: NDArray[np.float64],
-                    spp: int | None) -> NDArray[np.intp]:
+def tiles_to_double(
+    film: Film, tile_samples: NDArray[np.int64], errors: NDArray[np.float64], spp: int | None
+) -> NDArray[np.intp]:
     """Return the tile numbers of the next round; none if `spp` samples per pixel are reached. tile_samples, errors:
     (rows, columns), samples per pixel of each tile and squared error summed over its values."""
     height, width = film.pixels.shape
     samples = tile_samples * tile_pixels((width, height))
     done = int(samples.sum())
-    most = max(GROWTH * done, samples.max())    # at least the most expensive tile, else none might ever fit
+    most = max(GROWTH * done, samples.max())  # at least the most expensive tile, else none might ever fit
     if spp is not None:
         most = min(most, spp * film.pixels.size - done)
     return worth_doubling(errors, tile_sums(film.pixels["rays"]), samples, most)
 
 
-def worth_doubling(errors: NDArray[np.float64], rays: NDArray[np.float64], samples: NDArray[np.int64],
-                   most: float) -> NDArray[np.intp]:
+def worth_doubling(
+    errors: NDArray[np.float64], rays: NDArray[np.float64], samples: NDArray[np.int64], most: float
+) -> NDArray[np.intp]:
     """Return the tiles whose doubling reduces the error most per cost, with at most `most` samples in total.
 
     All arrays are (rows, columns) sums over a tile's values or pixels: squared error, which about halves with each

@@ -31,8 +31,15 @@ class Convergence:
         """Resume from a saved state."""
         self.noise, self.history = kept.noise, kept.history
 
-    def state(self, film: Film, tile_samples: NDArray[np.int64], seconds: float, reference: NDArray[np.float32] | None,
-              in_haste: bool, token: CancellationToken = NEVER) -> State:
+    def state(
+        self,
+        film: Film,
+        tile_samples: NDArray[np.int64],
+        seconds: float,
+        reference: NDArray[np.float32] | None,
+        in_haste: bool,
+        token: CancellationToken = NEVER,
+    ) -> State:
         """Return the state of the film, given the samples (rows, columns) of each tile and the elapsed seconds. If
         `in_haste`, the error estimate is not updated with this film. Raises Cancelled by the token."""
         if not in_haste:
@@ -45,9 +52,15 @@ class Convergence:
         self.last = State(spp, seconds, noise, relmse(film, reference), film, of_tiles)
         return self.last
 
-    def record(self, film: Film, tile_samples: NDArray[np.int64], seconds: float,
-               reference: NDArray[np.float32] | None = None, in_haste: bool = False,
-               token: CancellationToken = NEVER) -> State:
+    def record(
+        self,
+        film: Film,
+        tile_samples: NDArray[np.int64],
+        seconds: float,
+        reference: NDArray[np.float32] | None = None,
+        in_haste: bool = False,
+        token: CancellationToken = NEVER,
+    ) -> State:
         """Return the state, and append it to the history unless `in_haste`. Raises Cancelled by the token."""
         state = self.state(film, tile_samples, seconds, reference, in_haste, token)
         entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}

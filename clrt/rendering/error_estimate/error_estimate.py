@@ -67,10 +67,11 @@ class NoiseEstimate:
         if not due.any():
             return
         before, level = self._mean, self._level[due]
-        if level.max() >= 0:    # the first sample is not a change
+        if level.max() >= 0:  # the first sample is not a change
             relative, limits = film.relative_variance(token)
-            change = np.concatenate(in_bands(
-                mean.shape, lambda rows: tile_sums(((mean[rows] - before[rows]) / relative[rows]) ** 2), token))
+            change = np.concatenate(
+                in_bands(mean.shape, lambda rows: tile_sums(((mean[rows] - before[rows]) / relative[rows]) ** 2), token)
+            )
             both = np.stack([change, limits])
         self._changes += [np.full((2, *due.shape), np.nan) for _ in range(max(level) + 1 - len(self._changes))]
         for k in sorted({*level.tolist()} - {-1}):
@@ -112,7 +113,7 @@ class NoiseEstimate:
         """Return V(n/2)/V(n) at n = 2^level, over all tiles that have reached it."""
         steps = min(level - 1, STEPS)
         now, earlier = self._changes[level - 1], self._changes[level - 1 - steps]
-        known = np.isfinite(now + earlier).all(axis=0)   # not where a sample was dropped before there were others
+        known = np.isfinite(now + earlier).all(axis=0)  # not where a sample was dropped before there were others
         (changes, variance), (changes_then, variance_then) = now[:, known], earlier[:, known]
         if np.sum(changes) <= 0 or 1 << level > self._planned:
             return LEAST_FALL

@@ -57,7 +57,7 @@ def _beside(values: Floats, reach: int) -> Floats:
         sums = sums[:-count] + sums[count:]
         count *= 2
     height = len(values) - 2 * REACH
-    return sums[REACH - reach:][:height] + sums[REACH + 1:][:height]
+    return sums[REACH - reach :][:height] + sums[REACH + 1 :][:height]
 
 
 def _towards(start: Floats, end: Floats, variance: Floats) -> Any:

@@ -87,7 +87,7 @@ class Film:
         count = pixels["count"].astype(np.float64)[..., None]
         with np.errstate(divide="ignore", invalid="ignore"):
             squares = _sums(pixels, "square") / count
-            summed = squares >= (1 - 1e-6) * most    # also false for NaN
+            summed = squares >= (1 - 1e-6) * most  # also false for NaN
             variance = np.where(summed, np.maximum(squares - most, 0) / (count - 1), most)
         return np.where(count < 2, np.nan, variance)
 
@@ -133,7 +133,7 @@ class Film:
             variance = self._variance(there)
             squared = expected(_padded(mean[there], beyond), _padded(variance, beyond)) ** 2 + RELATIVE_FLOOR
             relative[rows] = np.sqrt(squared)
-            return tile_sums(variance[rows.start - there.start:][:rows.stop - rows.start] / squared)
+            return tile_sums(variance[rows.start - there.start :][: rows.stop - rows.start] / squared)
 
         return relative, np.concatenate(in_bands(mean.shape, judge, token))
 

@@ -35,11 +35,11 @@ class HostMemory:
         size = int(np.prod(self._shape)) * self._dtype.itemsize
         with suppress(MemoryError):
             while len(self._kept) < KEPT:
-                self._kept.append(np.full(size, 0, np.uint8))    # np.zeros would map pages on first use
+                self._kept.append(np.full(size, 0, np.uint8))  # np.zeros would map pages on first use
 
     def array(self) -> NDArray[Any]:
-        """Return an uninitialised array. Its memory is reused once neither it nor a view of it is referenced any more.
-        """
+        """Return an uninitialised array. Its memory is reused once neither it nor a view of it is referenced any
+        more."""
         self._search()
         for place, memory in enumerate(self._kept):
             if self._users[place]() is None:

@@ -24,6 +24,7 @@ def bands_of(size: tuple[int, ...]) -> list[slice]:
 
 def in_bands(size: tuple[int, ...], work: Callable[[slice], T], token: CancellationToken = NEVER) -> list[T]:
     """Return the results of `work` for the rows of each band, run in parallel; the token is checked before each."""
+
     def checked(rows: slice) -> T:
         token.check()
         return work(rows)

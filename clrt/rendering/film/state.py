@@ -60,11 +60,15 @@ def check_reference(reference: object, size: tuple[int, int]) -> None:
         raise UsageError(f"reference is the path {str(reference)!r}; read it with clrt.read_image")
     shape = real_array("reference", cast(ArrayLike, reference)).shape
     if not isinstance(reference, np.ndarray) or shape != (*size[::-1], 3):
-        raise UsageError(f"reference is a {type(reference).__name__} of shape {shape}; give a numpy array of the "
-                         f"image's shape, {(*size[::-1], 3)}")
+        raise UsageError(
+            f"reference is a {type(reference).__name__} of shape {shape}; give a numpy array of the "
+            f"image's shape, {(*size[::-1], 3)}"
+        )
     if bad := int(np.count_nonzero(~np.isfinite(reference).all(2))):
-        raise UsageError(f"reference has pixels that are NaN or infinite ({bad} of {size[0] * size[1]}), so no error "
-                         "can be measured against it; render it again")
+        raise UsageError(
+            f"reference has pixels that are NaN or infinite ({bad} of {size[0] * size[1]}), so no error "
+            "can be measured against it; render it again"
+        )
 
 
 def relmse(film: Film, reference: NDArray[np.float32] | None) -> float | None:

@@ -21,10 +21,18 @@ def creased(mesh: Mesh, degrees: float) -> Mesh:
     most `degrees`, weighted by their angles there. Corners share no vertices afterwards.
     """
     corners = mesh.faces.ravel()
-    arrays = {name: array[corners] for name in ("uv", "uv1", "colors", "tangents")
-              if (array := getattr(mesh, name)) is not None}
-    return replace(mesh, vertices=mesh.vertices[corners], faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
-                   normals=_normals(mesh, degrees), **arrays)
+    arrays = {
+        name: array[corners]
+        for name in ("uv", "uv1", "colors", "tangents")
+        if (array := getattr(mesh, name)) is not None
+    }
+    return replace(
+        mesh,
+        vertices=mesh.vertices[corners],
+        faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
+        normals=_normals(mesh, degrees),
+        **arrays,
+    )
 
 
 def _normals(mesh: Mesh, degrees: float) -> NDArray[np.float32]:
@@ -39,12 +47,12 @@ def _normals(mesh: Mesh, degrees: float) -> NDArray[np.float32]:
     sums, first = weighted.copy(), np.flatnonzero(~crowded)
     for step in range(1, MOST_AROUND):
         first = first[first + step < len(order)]
-        first = first[at[order[first]] == at[order[first + step]]]   # corners of lower-numbered points are finished
+        first = first[at[order[first]] == at[order[first + step]]]  # corners of lower-numbered points are finished
         if not len(first):
             break
         one, other = order[first], order[first + step]
         soft = np.einsum("ij,ij->i", own[one], own[other]) >= least
-        one, other = one[soft], other[soft]     # each index occurs at most once in each of the two
+        one, other = one[soft], other[soft]  # each index occurs at most once in each of the two
         sums[one] += weighted[other]
         sums[other] += weighted[one]
     if crowded.any():

@@ -45,8 +45,11 @@ def arranged(scene: Scene) -> ArrangedScene:
     kept = [i for i, keep in enumerate(keeps) if keep]
     rest = [i for i, keep in enumerate(keeps) if not keep]
     meshes = [scene.meshes[i] for i in others] + [baked(every[i]) for i in rest]
-    return ArrangedScene(replace(scene, instances=[every[i] for i in kept], meshes=meshes),
-                         others + [objects[i] for i in rest], [objects[i] for i in kept])
+    return ArrangedScene(
+        replace(scene, instances=[every[i] for i in kept], meshes=meshes),
+        others + [objects[i] for i in rest],
+        [objects[i] for i in kept],
+    )
 
 
 def worth_it(instances: list[Instance]) -> list[bool]:

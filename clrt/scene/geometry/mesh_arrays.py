@@ -20,8 +20,10 @@ def mesh_arrays(vertices: ArrayLike, faces: ArrayLike) -> tuple[Points, NDArray[
     outside = (indices < 0) | (indices >= len(points))
     if outside.any():
         face = int(np.argmax(outside.any(axis=1)))
-        raise SceneError(f"faces[{face}] = {indices[face].tolist()}: the mesh has {len(points)} vertices, counted from "
-                         "0; repair the mesh")
+        raise SceneError(
+            f"faces[{face}] = {indices[face].tolist()}: the mesh has {len(points)} vertices, counted from "
+            "0; repair the mesh"
+        )
     return points, indices.astype(np.int32)
 
 

@@ -16,8 +16,12 @@ Normals = Literal["file", "smooth", "flat"]
 PART = 1 << 14
 
 
-def choose_normals(wanted: Normals, vertices: FloatArray, faces: IntArray, stored: FloatArray | None,
-                   ) -> FloatArray | None:
+def choose_normals(
+    wanted: Normals,
+    vertices: FloatArray,
+    faces: IntArray,
+    stored: FloatArray | None,
+) -> FloatArray | None:
     """Return the normals that `wanted` selects: (n, 3) float32 of unit length, or None for flat shading.
 
     "file" takes the `stored` ones, and is flat if the file has none. Stored normals that are zero or not finite, as

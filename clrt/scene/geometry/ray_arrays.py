@@ -31,5 +31,8 @@ def ray_arrays(origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike) -> R
         if counted:
             raise UsageError(f"{name} {array.shape}: there are {count} {counted}; give as many, or one for all")
         count, counted = rays[0], name
-    return (np.broadcast_to(arrays["origins"], (count, 3)), np.broadcast_to(arrays["directions"], (count, 3)),
-            np.broadcast_to(arrays["t_max"], count))
+    return (
+        np.broadcast_to(arrays["origins"], (count, 3)),
+        np.broadcast_to(arrays["directions"], (count, 3)),
+        np.broadcast_to(arrays["t_max"], count),
+    )

@@ -94,38 +94,56 @@ def in_frame(scene: Scene, frame: SceneFrame) -> Scene:
     scene = replace(scene, instances=_instances(scene.instances, frame))
     if frame == SceneFrame():
         return scene
-    return replace(scene, meshes=[replace(mesh, vertices=frame.points(mesh.vertices),
-                                          material=mesh.material.in_unit(frame.unit)) for mesh in scene.meshes],
-                   camera=camera_in(scene.camera, frame),
-                   spheres=[_sphere(sphere, frame) for sphere in scene.spheres],
-                   lights=[_light(light, frame) for light in scene.lights])
+    return replace(
+        scene,
+        meshes=[
+            replace(mesh, vertices=frame.points(mesh.vertices), material=mesh.material.in_unit(frame.unit))
+            for mesh in scene.meshes
+        ],
+        camera=camera_in(scene.camera, frame),
+        spheres=[_sphere(sphere, frame) for sphere in scene.spheres],
+        lights=[_light(light, frame) for light in scene.lights],
+    )
 
 
 def _instances(instances: list[Instance], frame: SceneFrame) -> list[Instance]:
     """Return instances whose meshes are each in the frame around it, with transforms from there to `frame`."""
     meshes = meshes_by_id(instances)
     own = {key: frame_around(*_box(mesh)) for key, mesh in meshes.items()}
-    framed = {key: replace(mesh, vertices=own[key].points(mesh.vertices), material=mesh.material.in_unit(frame.unit))
-              for key, mesh in meshes.items()}
+    framed = {
+        key: replace(mesh, vertices=own[key].points(mesh.vertices), material=mesh.material.in_unit(frame.unit))
+        for key, mesh in meshes.items()
+    }
     placed = []
     for each in instances:
         around = own[id(each.mesh)]
         linear = each.to_world[:, :3] * (frame.unit / around.unit)
         offset = (each.to_world @ [*around.center, 1.0] - frame.center) * frame.unit
-        placed.append(replace(each, mesh=framed[id(each.mesh)], to_world=np.column_stack([linear, offset]),
-                              material=each.material and each.material.in_unit(frame.unit)))
+        placed.append(
+            replace(
+                each,
+                mesh=framed[id(each.mesh)],
+                to_world=np.column_stack([linear, offset]),
+                material=each.material and each.material.in_unit(frame.unit),
+            )
+        )
     return placed
 
 
 def camera_in(camera: Camera, frame: SceneFrame) -> Camera:
     """Return a camera in a frame."""
-    return replace(camera.scaled(frame.unit), position=frame.point(camera.position),
-                   look_at=frame.point(camera.look_at))
+    return replace(
+        camera.scaled(frame.unit), position=frame.point(camera.position), look_at=frame.point(camera.look_at)
+    )
 
 
 def _sphere(sphere: Sphere, frame: SceneFrame) -> Sphere:
-    return replace(sphere, center=frame.point(sphere.center), radius=sphere.radius * frame.unit,
-                   material=sphere.material.in_unit(frame.unit))
+    return replace(
+        sphere,
+        center=frame.point(sphere.center),
+        radius=sphere.radius * frame.unit,
+        material=sphere.material.in_unit(frame.unit),
+    )
 
 
 def _light(light: Light, frame: SceneFrame) -> Light:

@@ -49,9 +49,11 @@ def quaternion(x: float, y: float, z: float, w: float) -> Matrix:
     """Return the rotation of a quaternion (x, y, z, w) of any length but zero."""
     x, y, z, w = np.array([x, y, z, w]) / np.linalg.norm([x, y, z, w])
     matrix = np.eye(4)
-    matrix[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
     return matrix
 
 
@@ -89,8 +91,8 @@ def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
 
 
 def transform_light(light: Light, matrix: Matrix) -> Light:
-    """Return the light under an affine `matrix`, moved and rotated; its size, strength and range are kept, as in glTF.
-    """
+    """Return the light under an affine `matrix`, moved and rotated; its size, strength and range are kept, as in
+    glTF."""
     changed: dict[str, Any] = {}
     for name, value in vars(light).items():
         if name == "position":

@@ -75,9 +75,9 @@ def tables(ior: float, roughness: float | None, thin: bool) -> tuple[float, ...]
     """Build the table of one roughness, or a row for each of ROWS roughnesses: for the outside, then the inside,
     STEPS + 1 pairs (loss, rest), m/n² over the mean of grazing²/(grazing² + c²), and the fraction of rest on that side.
     """
-    roughnesses = np.linspace(0, 1, ROWS)**2 if roughness is None else [roughness]
+    roughnesses = np.linspace(0, 1, ROWS) ** 2 if roughness is None else [roughness]
     lattice = COARSE if roughness is None else FINE
-    rows = [_row(ior, max(float(r)**2, ALPHA_MIN), thin, lattice) for r in roughnesses]
+    rows = [_row(ior, max(float(r) ** 2, ALPHA_MIN), thin, lattice) for r in roughnesses]
     return tuple(np.concatenate(rows).astype(np.float32).tolist())
 
 
@@ -90,8 +90,10 @@ def sides(ior: float, alpha: float, thin: bool = False, lattice: tuple[int, int]
     losses = [1 - b.reflected.sum(axis=1) - b.passed.sum(axis=1) for b in bounces]
     made = []
     for b, loss, beyond in zip(bounces, losses, losses[::-1]):
-        kept = sum(np.sum(part / (1 - np.minimum(loss[:, None], at_cosines(other, cosines, near))), axis=1)
-                   for part, cosines, other in ((b.reflected, b.back, loss), (b.passed, b.on, beyond)))
+        kept = sum(
+            np.sum(part / (1 - np.minimum(loss[:, None], at_cosines(other, cosines, near))), axis=1)
+            for part, cosines, other in ((b.reflected, b.back, loss), (b.passed, b.on, beyond))
+        )
         rest = np.maximum(1 - kept, 0)
         made.append(Side(loss, rest, _mean(rest, near)))
     return made[0], made[-1]
@@ -110,7 +112,7 @@ def at_cosines(values: Doubles, cosines: Doubles, near: float) -> Doubles:
 
 def angles(near: float) -> Doubles:
     """Return the cosines of a table, (STEPS + 1,); the first is just above 0, as a limit. near: `grazing`."""
-    q = (np.arange(STEPS + 1) / STEPS)**2 / (1 + 4 * near)
+    q = (np.arange(STEPS + 1) / STEPS) ** 2 / (1 + 4 * near)
     return np.clip(4 * near * q / (1 - q), 1e-6 * near, 1)
 
 
@@ -164,7 +166,7 @@ def _normals(cosine: Doubles, alpha: float, points: int, generator: int) -> tupl
 
 def _seen(cos_o: Doubles, cos_i: Doubles, alpha: float) -> Doubles:
     """Return G2/G1 of the height-correlated Smith term; 0 if light goes to the wrong side."""
-    lambda_o, lambda_i = (np.sqrt(1 + alpha**2 * (1 / np.maximum(c, TINY)**2 - 1)) / 2 - 0.5 for c in (cos_o, cos_i))
+    lambda_o, lambda_i = (np.sqrt(1 + alpha**2 * (1 / np.maximum(c, TINY) ** 2 - 1)) / 2 - 0.5 for c in (cos_o, cos_i))
     return np.where(cos_i > 0, (1 + lambda_o) / (1 + lambda_o + lambda_i), 0)
 
 
@@ -172,7 +174,7 @@ def _mean(rest: Doubles, near: float) -> float:
     """Compute ∫ rest·2c dc, with rest linear in t between the table's angles."""
     t = (np.arange(16 * STEPS) + 0.5) / (16 * STEPS)
     q, width = t**2 / (1 + 4 * near), 4 * near
-    slope = width / (1 - q)**2 * 2 * t / (1 + width)    # dc/dt
+    slope = width / (1 - q) ** 2 * 2 * t / (1 + width)  # dc/dt
     return float(np.mean(np.interp(t, np.arange(STEPS + 1) / STEPS, rest) * 2 * width * q / (1 - q) * slope))
 
 
@@ -186,6 +188,10 @@ def _row(ior: float, alpha: float, thin: bool, lattice: tuple[int, int]) -> Doub
         mean = np.mean(2 * cosines * fresnel_dielectric(cosines, ior)[0])
         returned, scale = np.full(2, 2 * mean / (1 + mean)), np.full(2, outside.mean)
     near = grazing(ior, alpha, thin)
-    falling = near**2 * np.log1p(near**-2)    # ∫ near²/(near² + c²)·2c dc: m divided by it hardly depends on alpha
-    return np.concatenate([np.ravel([*zip(side.loss, side.rest), (m / falling, part)])
-                           for side, m, part in zip((outside, inside), scale, returned)])
+    falling = near**2 * np.log1p(near**-2)  # ∫ near²/(near² + c²)·2c dc: m divided by it hardly depends on alpha
+    return np.concatenate(
+        [
+            np.ravel([*zip(side.loss, side.rest), (m / falling, part)])
+            for side, m, part in zip((outside, inside), scale, returned)
+        ]
+    )

@@ -36,12 +36,12 @@ STEPS = 96
 ENTRY = 8
 #: Rows for a roughness from a texture, uniform in its square root.
 ROWS = 12
-GRID: Roughnesses = tuple((np.linspace(0, 1, ROWS)**2).tolist())
+GRID: Roughnesses = tuple((np.linspace(0, 1, ROWS) ** 2).tolist())
 #: Lower limit of fibres' roughness; smoother ones would reflect only at the horizon (kernels/bsdf/sheen.cl).
 SMOOTHEST = 0.1
 #: √cos at which albedos are tabulated, linear in between.
 ROOTS = np.linspace(0, 1, 193)
-NEAREST = 1e-3    # lower limit of √cos in integrals
+NEAREST = 1e-3  # lower limit of √cos in integrals
 LATTICE = (2584, 1597)
 
 
@@ -51,8 +51,7 @@ def rows(roughness: float | Texture) -> Roughnesses:
 
 
 @lru_cache(128)
-def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
-           smith: str = "height_correlated") -> Table:
+def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses, smith: str = "height_correlated") -> Table:
     """Build the table: for each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,)) entries
     of cosine-weighted means over the hemisphere, then those of STEPS + 1 angles. smith: the masking term of the gloss.
 
@@ -68,7 +67,7 @@ def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
     for row, mean, roughness in zip(table, means, base):
         below = _bounce(roughness, smith) * _mean_weights(ROOTS)
         for part, albedo in enumerate((films[:, None], bounded, both)):
-            mean[..., 4 * part:4 * part + 4] = albedo @ below.T
+            mean[..., 4 * part : 4 * part + 4] = albedo @ below.T
         for part, lost in enumerate(taken_from_gloss(roughness, smith)):
             row[..., part] = (films @ lost.T)[:, None]
             row[..., 2 + part] = bounded @ lost.T
@@ -92,22 +91,22 @@ def _mean_weights(roots: Doubles) -> Doubles:
 
 def _bounce(roughness: float, smith: str) -> Doubles:
     """Compute (4, len(ROOTS)): 1, and by_f0, by_f90 and lost of single scattering."""
-    whole, grazing = albedos(np.maximum(ROOTS, NEAREST)**2, max(roughness**2, ALPHA_MIN), smith)
+    whole, grazing = albedos(np.maximum(ROOTS, NEAREST) ** 2, max(roughness**2, ALPHA_MIN), smith)
     return np.array([np.ones_like(whole), whole - grazing, grazing, 1 - whole])
 
 
 def film_albedo(roots: Doubles, roughness: float) -> Doubles:
     """Compute (n,) the single-scattering albedo of a film of F0 0.04 at √cos (n,)."""
-    whole, grazing = albedos(np.maximum(roots, NEAREST)**2, max(roughness**2, ALPHA_MIN), "height_correlated")
+    whole, grazing = albedos(np.maximum(roots, NEAREST) ** 2, max(roughness**2, ALPHA_MIN), "height_correlated")
     return np.asarray(0.04 * (whole - grazing) + grazing)
 
 
 def taken_from_gloss(roughness: float, smith: str) -> tuple[Doubles, Doubles]:
     """Compute (STEPS + 1, len(ROOTS)) twice: what is taken from f0 and f90 per albedo at ROOTS."""
-    cosines = np.maximum(np.linspace(0, 1, STEPS + 1), NEAREST)**2
+    cosines = np.maximum(np.linspace(0, 1, STEPS + 1), NEAREST) ** 2
     alpha = max(roughness**2, ALPHA_MIN)
     met = microfacets(cosines, alpha, LATTICE)
-    grazing = np.maximum(1 - met.cos_o, 0)**5
+    grazing = np.maximum(1 - met.cos_o, 0) ** 5
     there = met.cosine, np.maximum(met.back, NEAREST**2), alpha
     seen = met.weight * met.seen * shadowing(*there, smith) / shadowing(*there, "height_correlated")
     return _below(cosines, met.back, seen * (1 - grazing)), _below(cosines, met.back, seen * grazing)
@@ -127,8 +126,10 @@ def _at(cosines: Doubles, weights: Doubles) -> Doubles:
     first = np.minimum(place.astype(np.int64), len(ROOTS) - 2)
     across, row = place - first, len(ROOTS) * np.arange(len(cosines))[:, None]
     size = len(cosines) * len(ROOTS)
-    counted = (np.bincount((row + first + step).ravel(), (weights * part).ravel(), size)
-               for step, part in ((0, 1 - across), (1, across)))
+    counted = (
+        np.bincount((row + first + step).ravel(), (weights * part).ravel(), size)
+        for step, part in ((0, 1 - across), (1, across))
+    )
     return np.asarray(sum(counted)).reshape(len(cosines), len(ROOTS))
 
 
@@ -140,12 +141,12 @@ class Fibres:
     """
 
     def __init__(self, roughness: float) -> None:
-        n = max(roughness, SMOOTHEST)**-2
+        n = max(roughness, SMOOTHEST) ** -2
         nodes, weights = np.polynomial.legendre.leggauss(64)
         roots = (nodes + 1) / 2
         across = _fibres(roots**2, roots**2, n) @ (weights * roots)
         every = np.union1d(ROOTS, np.linspace(0, 1, STEPS + 1))
-        cosines = np.maximum(every, NEAREST)**2
+        cosines = np.maximum(every, NEAREST) ** 2
         values = _fibres(cosines, roots**2, n) * (weights * roots)
         unbounded = values.sum(axis=1)
         values /= np.maximum(np.maximum(unbounded[:, None], across), 1)
@@ -161,6 +162,6 @@ def _fibres(cos_o: Doubles, cos_i: Doubles, n: float) -> Doubles:
     o, i = cos_o[:, None], cos_i
     phi = np.pi * (np.arange(64) + 0.5)[:, None, None] / 64
     along = np.sqrt((1 - o**2) * (1 - i**2)) * np.cos(phi)
-    sine2 = np.maximum(1 - (o + i)**2 / np.maximum(2 * (1 + o * i + along), 1e-300), 0)
-    d = (2 + n) / (2 * np.pi) * np.mean(sine2**(n / 2), axis=0)
+    sine2 = np.maximum(1 - (o + i) ** 2 / np.maximum(2 * (1 + o * i + along), 1e-300), 0)
+    d = (2 + n) / (2 * np.pi) * np.mean(sine2 ** (n / 2), axis=0)
     return np.asarray(2 * np.pi * d * i / (4 * (o + i - o * i)))

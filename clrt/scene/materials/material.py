@@ -89,9 +89,11 @@ class Material:
 
     def without_textures(self: Self) -> Self:
         """Return the material with each texture replaced by its factor."""
-        plain: dict[str, Any] = {name: None if role is TextureRole.MAP else factor_of(getattr(self, name), role)
-                                 for name, role in texture_roles(type(self)).items()
-                                 if isinstance(getattr(self, name), Texture)}
+        plain: dict[str, Any] = {
+            name: None if role is TextureRole.MAP else factor_of(getattr(self, name), role)
+            for name, role in texture_roles(type(self)).items()
+            if isinstance(getattr(self, name), Texture)
+        }
         return replace(self, **plain)
 
     @property
@@ -143,8 +145,9 @@ def _texture_roles(kind: type) -> dict[str, TextureRole]:
         accepted = get_args(hint)
         if Texture in accepted:
             is_color = any(get_origin(part) is tuple for part in accepted)
-            roles[name] = (TextureRole.MAP if NoneType in accepted else
-                           TextureRole.COLOR if is_color else TextureRole.NUMBER)
+            roles[name] = (
+                TextureRole.MAP if NoneType in accepted else TextureRole.COLOR if is_color else TextureRole.NUMBER
+            )
     return roles
 
 

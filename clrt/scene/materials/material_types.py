@@ -103,8 +103,9 @@ class Dielectric(Material):
         if self.thin:
             values["thin"] = 1.0
         if (distance := self.attenuation_distance) is not None:
-            values["absorption"] = tuple(min(-log(max(part, BLACK)) / distance, 1 / BLACK)
-                                         for part in self.attenuation_color)
+            values["absorption"] = tuple(
+                min(-log(max(part, BLACK)) / distance, 1 / BLACK) for part in self.attenuation_color
+            )
         return values
 
     @property
@@ -130,9 +131,14 @@ class Dielectric(Material):
         return self if distance is None else replace(self, attenuation_distance=distance * unit)
 
     def features(self) -> frozenset[str]:
-        has = {"TRANSMISSION": True, "ROUGH_DIELECTRIC": self.rough, "TRANSMISSION_LOBES": self.rough,
-               "DIELECTRIC_ENERGY": self.scatters_again,
-               "THIN_DIELECTRIC": self.thin, "ATTENUATION": self.attenuation_distance is not None}
+        has = {
+            "TRANSMISSION": True,
+            "ROUGH_DIELECTRIC": self.rough,
+            "TRANSMISSION_LOBES": self.rough,
+            "DIELECTRIC_ENERGY": self.scatters_again,
+            "THIN_DIELECTRIC": self.thin,
+            "ATTENUATION": self.attenuation_distance is not None,
+        }
         return frozenset(name for name, present in has.items() if present)
 
 
@@ -159,5 +165,4 @@ class BlinnPhong(Phong):
     kernel: ClassVar[str] = "blinn_phong"
 
 
-MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric, Conductor, Phong,
-                                         BlinnPhong)
+MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric, Conductor, Phong, BlinnPhong)

@@ -45,8 +45,13 @@ class MetallicRoughness(Material):
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
-    parts: ClassVar[tuple[str, ...]] = ("LAYERS", "LAYER_ENERGY", "SHEEN", "GGX_ALBEDO",
-                                        *(f"ALBEDO_{smith.upper()}" for smith in get_args(Smith)))
+    parts: ClassVar[tuple[str, ...]] = (
+        "LAYERS",
+        "LAYER_ENERGY",
+        "SHEEN",
+        "GGX_ALBEDO",
+        *(f"ALBEDO_{smith.upper()}" for smith in get_args(Smith)),
+    )
     color: Albedo | Texture = (0.8, 0.8, 0.8)
     metallic: Unit | Texture = 0.0
     roughness: Unit | Texture = 0.5
@@ -65,14 +70,19 @@ class MetallicRoughness(Material):
     transmission: Unit | Texture = 0.0
 
     def parameters(self) -> dict[str, Parameter]:
-        color, f0, metallic = self.color, (((self.ior - 1) / (self.ior + 1))**2,) * 3, self.metallic
+        color, f0, metallic = self.color, (((self.ior - 1) / (self.ior + 1)) ** 2,) * 3, self.metallic
         if self.preset is not None:
             f0, metallic = F0_PRESETS[self.preset]
             color = f0 if metallic else color
-        return {"color": color, "metallic": metallic, "roughness": self.roughness, "f0": f0,
-                "smith": float(get_args(Smith).index(self.smith)),
-                "coupling": float(get_args(Coupling).index(self.coupled_by)),
-                "multiple": float("MULTIPLE_SCATTERING" in self.features())} | self._layers()
+        return {
+            "color": color,
+            "metallic": metallic,
+            "roughness": self.roughness,
+            "f0": f0,
+            "smith": float(get_args(Smith).index(self.smith)),
+            "coupling": float(get_args(Coupling).index(self.coupled_by)),
+            "multiple": float("MULTIPLE_SCATTERING" in self.features()),
+        } | self._layers()
 
     @property
     def coupled_by(self) -> Coupling:
@@ -91,14 +101,19 @@ class MetallicRoughness(Material):
             values |= {"sheen_color": self.sheen_color, "sheen_roughness": self.sheen_roughness}
         if "LAYER_ENERGY" in has:
             rows = [layer_energy.rows(roughness) for roughness in self._roughnesses(has)]
-            values |= {"layer_energy": layer_energy.tables(*rows, self.smith),
-                       "last_rows": tuple(len(each) - 1.0 for each in rows)}
+            values |= {
+                "layer_energy": layer_energy.tables(*rows, self.smith),
+                "last_rows": tuple(len(each) - 1.0 for each in rows),
+            }
         return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
 
     def _roughnesses(self, has: frozenset[str]) -> tuple[Unit | Texture, ...]:
         """Return the roughnesses of base, film and fibres; for an absent layer, any number."""
-        return (self.roughness, self.clearcoat_roughness if "CLEARCOAT" in has else 0.0,
-                self.sheen_roughness if "SHEEN" in has else 1.0)
+        return (
+            self.roughness,
+            self.clearcoat_roughness if "CLEARCOAT" in has else 0.0,
+            self.sheen_roughness if "SHEEN" in has else 1.0,
+        )
 
     @property
     def bent_by(self) -> Texture | None:
@@ -109,32 +124,46 @@ class MetallicRoughness(Material):
         """Return its constant parameters as lobes; TypeError if one of them is a texture."""
         single = self.parameters()
         color, f0, metallic, roughness = (single[name] for name in ("color", "f0", "metallic", "roughness"))
-        if not (isinstance(color, tuple) and isinstance(f0, tuple) and isinstance(metallic, float | int)
-                and isinstance(roughness, float | int)):
+        if not (
+            isinstance(color, tuple)
+            and isinstance(f0, tuple)
+            and isinstance(metallic, float | int)
+            and isinstance(roughness, float | int)
+        ):
             raise TypeError("a texture has no lobes of its own")
         f0 = tuple(f + metallic * (c - f) for f, c in zip(f0, color))
         return Lobes(f0, tuple((1 - metallic) * c for c in color), max(roughness**2, ALPHA_MIN))
 
     def features(self) -> frozenset[str]:
         metallic = self.metallic if self.preset is None else F0_PRESETS[self.preset][1]
-        layers = {"CLEARCOAT": self.clearcoat != 0, "SHEEN": self.sheen_color != (0, 0, 0),
-                  "THROUGH": self.transmission != 0}
+        layers = {
+            "CLEARCOAT": self.clearcoat != 0,
+            "SHEEN": self.sheen_color != (0, 0, 0),
+            "THROUGH": self.transmission != 0,
+        }
         further = self.coupled_by == "albedo" if self.multiple_scattering is None else self.multiple_scattering
         # With the albedo coupling the diffuse lobe reflects what the specular one does not, so only metal loses energy.
         further &= metallic != 0 or self.coupled_by != "albedo" or layers["THROUGH"]
         above = layers["CLEARCOAT"] or layers["SHEEN"]
-        coupled = metallic != 1 or above    # the coupled lobe also carries what layers take from the gloss
+        coupled = metallic != 1 or above  # the coupled lobe also carries what layers take from the gloss
         fitted = further or (coupled and self.coupled_by == "albedo")
         # A clearcoat's own albedo is that of the height-correlated form.
         forms = {self.smith} if fitted else set()
         forms |= {"height_correlated"} if layers["CLEARCOAT"] else set()
-        has = {f"SMITH_{self.smith.upper()}": True, f"COUPLING_{self.coupled_by.upper()}": coupled,
-               "MULTIPLE_SCATTERING": further, "GGX_ALBEDO": bool(forms), **layers,
-               **{f"ALBEDO_{form.upper()}": True for form in forms},
-               "COAT_NORMALS": layers["CLEARCOAT"] and self.bent_by is not None,
-               "LAYERS": any(layers.values()), "LAYER_ENERGY": above,
-               "LAYER_ROWS": above and any(isinstance(r, Texture) for r in (self.roughness, self.clearcoat_roughness,
-                                                                            self.sheen_roughness)),
-               "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
-               "TRANSMISSION": layers["THROUGH"], "TRANSMISSION_LOBES": layers["THROUGH"]}
+        has = {
+            f"SMITH_{self.smith.upper()}": True,
+            f"COUPLING_{self.coupled_by.upper()}": coupled,
+            "MULTIPLE_SCATTERING": further,
+            "GGX_ALBEDO": bool(forms),
+            **layers,
+            **{f"ALBEDO_{form.upper()}": True for form in forms},
+            "COAT_NORMALS": layers["CLEARCOAT"] and self.bent_by is not None,
+            "LAYERS": any(layers.values()),
+            "LAYER_ENERGY": above,
+            "LAYER_ROWS": above
+            and any(isinstance(r, Texture) for r in (self.roughness, self.clearcoat_roughness, self.sheen_roughness)),
+            "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
+            "TRANSMISSION": layers["THROUGH"],
+            "TRANSMISSION_LOBES": layers["THROUGH"],
+        }
         return frozenset(name for name, present in has.items() if present)

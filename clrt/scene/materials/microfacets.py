@@ -29,7 +29,7 @@ def albedos(cosines: Doubles, alpha: float, smith: str) -> tuple[Doubles, Double
     """
     y, weight = np.polynomial.legendre.leggauss(32)
     phi, phi_weight = np.pi / 2 * (1 - y**3), 1.5 * y**2 * weight
-    rest, psi_weight = ((1 - y) / 2)**3, 1.5 * ((1 - y) / 2)**2 * weight
+    rest, psi_weight = ((1 - y) / 2) ** 3, 1.5 * ((1 - y) / 2) ** 2 * weight
     cosine = np.asarray(cosines, np.float64)[:, None, None]
     along = np.sqrt(1 - cosine**2) * np.cos(phi)[:, None]
     root = np.sqrt(along**2 + cosine**2)
@@ -39,7 +39,7 @@ def albedos(cosines: Doubles, alpha: float, smith: str) -> tuple[Doubles, Double
     cos_i = np.maximum(2 * (cosine + along * slope) / (1 + slope**2) - cosine, 1e-300)
     visible = 2 * np.sin(psi) * (np.cos(psi) + alpha * along / cosine * np.sin(psi))
     reflected = visible * shadowing(cosine, cos_i, alpha, smith) * np.arctan(horizon / alpha)
-    grazing = np.maximum(1 - (cosine + along * slope) / np.sqrt(1 + slope**2), 0)**5
+    grazing = np.maximum(1 - (cosine + along * slope) / np.sqrt(1 + slope**2), 0) ** 5
     whole, part = (np.sum(value * psi_weight, axis=2) @ phi_weight for value in (reflected, reflected * grazing))
     return np.asarray(whole), np.asarray(part)
 
@@ -59,4 +59,4 @@ def shadowing(cos_o: Doubles, cos_i: Doubles, alpha: float, smith: str) -> Doubl
 
 def schlick_k(alpha: float, smith: str) -> float:
     """Return k of Schlick's approximation: (roughness + 1)²/8, or alpha/2 for "schlick_ibl"."""
-    return float(alpha / 2 if smith == "schlick_ibl" else (np.sqrt(alpha) + 1)**2 / 8)
+    return float(alpha / 2 if smith == "schlick_ibl" else (np.sqrt(alpha) + 1) ** 2 / 8)

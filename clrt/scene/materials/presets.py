@@ -19,8 +19,20 @@ F0_PRESETS: dict[str, tuple[tuple[float, float, float], float]] = {
     "aluminium": ((0.91, 0.92, 0.92), 1.0),
     "silver": ((0.95, 0.93, 0.88), 1.0),
 }
-Preset = Literal["water", "plastic_low", "plastic_high", "glass_low", "glass_high", "ruby", "diamond",
-                 "iron", "copper", "gold", "aluminium", "silver"]
+Preset = Literal[
+    "water",
+    "plastic_low",
+    "plastic_high",
+    "glass_low",
+    "glass_high",
+    "ruby",
+    "diamond",
+    "iron",
+    "copper",
+    "gold",
+    "aluminium",
+    "silver",
+]
 
 Color = tuple[float, float, float]
 #: Complex indices of refraction (eta, k) in red, green and blue: at 611, 549 and 464 nm, the hues of Rec. 709's

@@ -45,8 +45,11 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
     if problems:
         more = [f"{where}: {len(problems) - MOST} more mistakes like these"] if len(problems) > MOST else []
         return problems[:MOST] + more
-    return [f"{where}.{name}: {show(value)} is outside the range of float32; write a smaller number"
-            for name, value in plain.items() if _too_large(value)]
+    return [
+        f"{where}.{name}: {show(value)} is outside the range of float32; write a smaller number"
+        for name, value in plain.items()
+        if _too_large(value)
+    ]
 
 
 def usable(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -104,9 +107,11 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
     elif hint is Texture and not isinstance(value, Texture):
         yield f'{path}: {show(value)} is not a texture; write {{ image = "FILE" }}'
     elif isinstance(hint, type) and is_dataclass(hint):
-        yield from (field_problems(hint, {field.name: getattr(value, field.name) for field in fields(hint)}, path)
-                    if isinstance(value, hint) else
-                    [f"{path}: {show(value)} is not of type {hint.__name__}; write one"])
+        yield from (
+            field_problems(hint, {field.name: getattr(value, field.name) for field in fields(hint)}, path)
+            if isinstance(value, hint)
+            else [f"{path}: {show(value)} is not of type {hint.__name__}; write one"]
+        )
     elif origin is Literal:
         if not (isinstance(value, str) and value in parts):
             yield f"{path}: {show(value)} {unknown(value, parts)}"
@@ -172,14 +177,19 @@ def _fault(kind: Any, value: Any) -> str:
 
 
 _ACCEPTED: dict[Any, Any] = {float: (float, int), int: int, str: str, bool: bool, tuple: tuple}
-_REMEDIES = {float: "is not a number; write one without quotes",
-             int: "is not an integer; write one without quotes or decimal point",
-             str: "is not a string; write it in quotes",
-             bool: "is not a boolean; write true or false",
-             tuple: "is not a list; write the numbers in brackets"}
+_REMEDIES = {
+    float: "is not a number; write one without quotes",
+    int: "is not an integer; write one without quotes or decimal point",
+    str: "is not a string; write it in quotes",
+    bool: "is not a boolean; write true or false",
+    tuple: "is not a list; write the numbers in brackets",
+}
 _LIMITS: dict[type, tuple[Callable[[float, float], bool], str, str]] = {
-    Ge: (operator.ge, "is below", "write at least"), Le: (operator.le, "is above", "write at most"),
-    Gt: (operator.gt, "is not above", "write more than"), Lt: (operator.lt, "is not below", "write less than")}
+    Ge: (operator.ge, "is below", "write at least"),
+    Le: (operator.le, "is above", "write at most"),
+    Gt: (operator.gt, "is not above", "write more than"),
+    Lt: (operator.lt, "is not below", "write less than"),
+}
 
 
 def plain_value(value: Any) -> Any:

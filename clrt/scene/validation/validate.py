@@ -48,7 +48,8 @@ def scene_problems(scene: Scene) -> list[str]:
     problems = _camera_problems(scene.camera)
     if scene.animation is not None:
         problems += _object_problems(scene.animation, Animation, "animation") or (
-            [] if problems else animation_problems(scene.camera, scene.animation))
+            [] if problems else animation_problems(scene.camera, scene.animation)
+        )
     problems += _environment_problems(scene.environment)
     problems += _object_problems(scene.render, RenderSettings, "render") or _raster_problems(scene)
     users: list[tuple[str, Mesh | Sphere | Instance]] = []
@@ -61,8 +62,11 @@ def scene_problems(scene: Scene) -> list[str]:
         problems += _object_problems(sphere, Sphere, f"sphere[{i}]")
         users.append((f"sphere[{i}].material", sphere))
     problems += _instance_problems(scene.instances, of_mesh)
-    users += [(f"instance[{i}].material", instance) for i, instance in enumerate(scene.instances)
-              if getattr(instance, "material", None) is not None]
+    users += [
+        (f"instance[{i}].material", instance)
+        for i, instance in enumerate(scene.instances)
+        if getattr(instance, "material", None) is not None
+    ]
     problems += _material_problems(users)
     for i, light in enumerate(scene.lights):
         problems += _light_problems(light, f"light[{i}]")
@@ -72,8 +76,11 @@ def scene_problems(scene: Scene) -> list[str]:
 def _list_problems(scene: Scene) -> list[str]:
     """Return problems of parts of the scene that should be lists and are not."""
     parts = {name: getattr(scene, name) for name in ("meshes", "instances", "spheres", "lights")}
-    return [f"{name}: {show(part)} is not a list; write {name}=[...]" for name, part in parts.items()
-            if not isinstance(part, (list, tuple))]
+    return [
+        f"{name}: {show(part)} is not a list; write {name}=[...]"
+        for name, part in parts.items()
+        if not isinstance(part, (list, tuple))
+    ]
 
 
 def mesh_problems(mesh: object, where: str) -> list[str]:
@@ -87,11 +94,16 @@ def mesh_problems(mesh: object, where: str) -> list[str]:
     where += f" {show(mesh.name)}"
     n = len(mesh.vertices) if isinstance(mesh.vertices, np.ndarray) else 0
     arrays: list[tuple[str, object, type, str, tuple[int, ...]]] = [
-        ("vertices", mesh.vertices, np.float32, "n", (3,)), ("faces", mesh.faces, np.int32, "m", (3,))]
+        ("vertices", mesh.vertices, np.float32, "n", (3,)),
+        ("faces", mesh.faces, np.int32, "m", (3,)),
+    ]
     corners = {name: array for name in CORNERS if (array := getattr(mesh, name)) is not None}
     arrays += [(name, array, np.float32, str(n), CORNERS[name]) for name, array in corners.items()]
-    problems = [problem for name, array, dtype, rows, columns in arrays
-                if (problem := _array_problem(array, dtype, rows, columns, f"{where}: {name}"))]
+    problems = [
+        problem
+        for name, array, dtype, rows, columns in arrays
+        if (problem := _array_problem(array, dtype, rows, columns, f"{where}: {name}"))
+    ]
     if problems:
         wide = isinstance(mesh.faces, np.ndarray) and mesh.faces.dtype in (np.int64, np.uint64, np.uint32)
         return wide and index_problems(mesh.faces, n, where) or problems
@@ -113,9 +125,12 @@ def texture_problems(mesh: Mesh, where: str) -> list[str]:
     """Return problems of textures for which the mesh has no texture coordinates."""
     material: object = mesh.material
     textures = material.textures() if isinstance(material, Material) else []
-    return [f'{where} {show(mesh.name)}: its material reads the texture {show(texture.picture.name)} at uv'
-            f'{texture.uv_set or ""}, but the mesh has none; add texture coordinates, or use another material'
-            for texture in textures if (mesh.uv1 if texture.uv_set else mesh.uv) is None]
+    return [
+        f"{where} {show(mesh.name)}: its material reads the texture {show(texture.picture.name)} at uv"
+        f"{texture.uv_set or ''}, but the mesh has none; add texture coordinates, or use another material"
+        for texture in textures
+        if (mesh.uv1 if texture.uv_set else mesh.uv) is None
+    ]
 
 
 def index_problems(faces: NDArray[np.integer], n: int, where: str) -> list[str]:
@@ -183,8 +198,10 @@ def _instance_problems(instances: list[Instance], of_mesh: dict[int, list[str]])
         where = f"instance[{i}]"
         wrong = _object_problems(instance, Instance, where)
         if not wrong and np.shape(instance.to_world) != (3, 4):
-            wrong = [f"{where} {show(instance.name)}: to_world has shape {np.shape(instance.to_world)}; write a numpy "
-                     "array of shape (3, 4), or (4, 4) with the last row 0, 0, 0, 1"]
+            wrong = [
+                f"{where} {show(instance.name)}: to_world has shape {np.shape(instance.to_world)}; write a numpy "
+                "array of shape (3, 4), or (4, 4) with the last row 0, 0, 0, 1"
+            ]
         if isinstance(instance, Instance) and id(instance.mesh) not in of_mesh:
             wrong += of_mesh.setdefault(id(instance.mesh), mesh_problems(instance.mesh, f"{where}.mesh"))
         problems += wrong
@@ -225,8 +242,12 @@ def _camera_problems(camera: Camera) -> list[str]:
     right = np.cross(forward / np.abs(forward).max(), up / np.abs(up).max())
     if np.linalg.norm(right) < 1e-6:
         return [f"camera.up: {show(camera.up)} is parallel to the view direction; write another, such as [0, 0, -1]"]
-    return [f'camera.{name}: {show(getattr(camera, name))} has no effect with projection = "{camera.projection}"; '
-            'leave it out' for name, default in camera.unread_fields().items() if getattr(camera, name) != default]
+    return [
+        f'camera.{name}: {show(getattr(camera, name))} has no effect with projection = "{camera.projection}"; '
+        "leave it out"
+        for name, default in camera.unread_fields().items()
+        if getattr(camera, name) != default
+    ]
 
 
 def _raster_problems(scene: Scene) -> list[str]:
@@ -234,10 +255,15 @@ def _raster_problems(scene: Scene) -> list[str]:
     camera = scene.camera
     if scene.render.integrator != "raster" or (camera.projection == "perspective" and not camera.aperture_radius):
         return []
-    given = (f"projection = {show(camera.projection)}" if camera.projection != "perspective"
-             else f"aperture_radius = {camera.aperture_radius:g}")
-    return [f'render.integrator: "raster" supports only pinhole cameras, and the camera has {given}; leave that out, '
-            'or write "local"']
+    given = (
+        f"projection = {show(camera.projection)}"
+        if camera.projection != "perspective"
+        else f"aperture_radius = {camera.aperture_radius:g}"
+    )
+    return [
+        f'render.integrator: "raster" supports only pinhole cameras, and the camera has {given}; leave that out, '
+        'or write "local"'
+    ]
 
 
 def _environment_problems(environment: Environment) -> list[str]:
@@ -255,8 +281,10 @@ def _environment_problems(environment: Environment) -> list[str]:
         if bad.any():
             pixels = bad.any(axis=2)
             row, column = np.argwhere(pixels)[0]
-            problems.append(f"{where}: {np.count_nonzero(pixels)} pixels are {fault}, the first in row {row}, "
-                            f"column {column}: {_row(image[row, column])}; repair the image")
+            problems.append(
+                f"{where}: {np.count_nonzero(pixels)} pixels are {fault}, the first in row {row}, "
+                f"column {column}: {_row(image[row, column])}; repair the image"
+            )
     return problems
 
 

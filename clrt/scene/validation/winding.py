@@ -21,8 +21,10 @@ def backward_emitters(scene: Scene) -> list[str]:
     Either the bounding box of the scene and its camera lies behind each triangle, or the mesh is closed, its front
     faces are inside, and nothing else is in there. Needs no device; free for scenes without emissive meshes.
     """
-    meshes = [*scene.meshes, *(baked(each) for each in scene.instances
-                               if any((each.material or each.mesh.material).radiance))]
+    meshes = [
+        *scene.meshes,
+        *(baked(each) for each in scene.instances if any((each.material or each.mesh.material).radiance)),
+    ]
     emitters = [mesh for mesh in meshes if any(mesh.material.radiance) and not mesh.material.double_sided]
     if not emitters:
         return []

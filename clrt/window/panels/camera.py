@@ -23,8 +23,9 @@ class CameraPanel:
         controls, camera = editor.controls, editor.scene.camera
         controls.mode = choose("dragging", ["look", "orbit"], controls.mode)
         imgui.set_item_tooltip(ABOUT)
-        _, controls.pace = imgui.slider_float("speed", controls.pace, 0.01, 10, "%.2g",
-                                              imgui.SliderFlags_.logarithmic.value)
+        _, controls.pace = imgui.slider_float(
+            "speed", controls.pace, 0.01, 10, "%.2g", imgui.SliderFlags_.logarithmic.value
+        )
         imgui.set_item_tooltip("Walking speed per second, relative to the distance to the look-at point.")
         imgui.push_id("camera")
         new = edit_fields(camera, editor.step)

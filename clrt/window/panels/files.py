@@ -26,8 +26,11 @@ class Files:
         imgui.same_line()
         if imgui.button("open") and self.other:
             editor.open(Path(self.other))
-        actions: dict[str, Callable[[Path], None]] = {"picture": editor.save_picture, "scene": editor.save_scene,
-                                                      "screenshot": editor.save_screenshot}
+        actions: dict[str, Callable[[Path], None]] = {
+            "picture": editor.save_picture,
+            "scene": editor.save_scene,
+            "screenshot": editor.save_screenshot,
+        }
         for what, write in actions.items():
             imgui.push_id(what)
             _, self.names[what] = imgui.input_text("##file", self.names[what])

@@ -58,8 +58,14 @@ def _new(camera: Camera) -> dict[str, Light]:
     far = distance(camera)
     up = np.asarray(camera.up) / np.linalg.norm(camera.up)
     position, down = np.add(camera.look_at, far * up).tolist(), (-up).tolist()
-    values = {"position": position, "direction": down, "irradiance": (BRIGHT,) * 3, "intensity": (BRIGHT * far**2,) * 3,
-              "radius": far / SMALL, "radiance": (BRIGHT * SMALL**2 / np.pi,) * 3}
+    values = {
+        "position": position,
+        "direction": down,
+        "irradiance": (BRIGHT,) * 3,
+        "intensity": (BRIGHT * far**2,) * 3,
+        "radius": far / SMALL,
+        "radiance": (BRIGHT * SMALL**2 / np.pi,) * 3,
+    }
     return {kind.kernel: kind(**fields_of(kind, values)) for kind in LIGHTS}
 
 

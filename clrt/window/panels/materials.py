@@ -56,8 +56,13 @@ def _of_type(material: Material, kernel: str) -> Material:
     if type(material) is kind:
         return material
     hints, own = get_type_hints(kind, include_extras=True), get_type_hints(type(material), include_extras=True)
-    return kind(**{field.name: getattr(material, field.name) for field in fields(kind)
-                   if field.name in own and own[field.name] == hints[field.name]})
+    return kind(
+        **{
+            field.name: getattr(material, field.name)
+            for field in fields(kind)
+            if field.name in own and own[field.name] == hints[field.name]
+        }
+    )
 
 
 def _substances() -> dict[str, tuple[str, str]]:
@@ -83,6 +88,9 @@ def _together(old: Material, new: Material) -> Material:
     optional = [field.name for field in fields(new) if field.default is None and field.name not in SHARED]
     taken = any(getattr(old, name) is not None and getattr(new, name) is None for name in optional)
     known = old.parameters()
-    given: dict[str, Any] = {name: None if taken else known.get(name, getattr(new, name)) for name in optional
-                             if taken or getattr(old, name) is None}
+    given: dict[str, Any] = {
+        name: None if taken else known.get(name, getattr(new, name))
+        for name in optional
+        if taken or getattr(old, name) is None
+    }
     return replace(new, **given)

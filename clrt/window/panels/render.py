@@ -16,11 +16,19 @@ from ..fields import choose, edit, edit_fields
 from ..tone_mapping import DisplaySettings
 
 #: Settings with a fixed set of values, by name; None selects automatically by device and scene.
-CHOICES: dict[str, list[Any]] = {"tree": [None, True, False], "builder": [None, *BUILDER_NAMES],
-                                 "layout": [None, *TREES], "triangle": [*TRIANGLE_TESTS]}
+CHOICES: dict[str, list[Any]] = {
+    "tree": [None, True, False],
+    "builder": [None, *BUILDER_NAMES],
+    "layout": [None, *TREES],
+    "triangle": [*TRIANGLE_TESTS],
+}
 #: The other settings, and their types (live.settings).
-NUMBERS: dict[str, Any] = {"samples": Annotated[int, Ge(1), Le(64)], "scale": Annotated[float, Ge(0.05), Le(4)],
-                           "frame_rate": Annotated[float, Ge(0), Le(120)], "denoise": bool}
+NUMBERS: dict[str, Any] = {
+    "samples": Annotated[int, Ge(1), Le(64)],
+    "scale": Annotated[float, Ge(0.05), Le(4)],
+    "frame_rate": Annotated[float, Ge(0), Le(120)],
+    "denoise": bool,
+}
 
 
 def show(editor: Editor) -> None:
@@ -35,8 +43,10 @@ def show(editor: Editor) -> None:
         editor.choose(settings)
     imgui.separator_text("Display")
     exposure = Annotated[float, Ge(-10), Le(10)]
-    editor.look = DisplaySettings(choose("view", [*VIEWS, "aces"], editor.look.view),
-                                  edit("exposure", exposure, editor.look.exposure, editor.step))
+    editor.look = DisplaySettings(
+        choose("view", [*VIEWS, "aces"], editor.look.view),
+        edit("exposure", exposure, editor.look.exposure, editor.step),
+    )
     imgui.pop_id()
 
 

@@ -62,11 +62,16 @@ def _means(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
 
 def _noise(snapshot: Snapshot) -> None:
     """Plot the estimated error over time, both axes logarithmic."""
-    points = np.array([(entry["seconds"], entry["noise"]) for entry in snapshot.history
-                       if entry["noise"] and entry["seconds"] > 0], np.float64).reshape(-1, 2)
-    spans = len(points) > 1     # a single point leaves the axes without extent
-    if implot.begin_plot("##noise", (-1, LINES * imgui.get_text_line_height_with_spacing()),
-                         implot.Flags_.no_legend.value | implot.Flags_.no_mouse_text.value):
+    points = np.array(
+        [(entry["seconds"], entry["noise"]) for entry in snapshot.history if entry["noise"] and entry["seconds"] > 0],
+        np.float64,
+    ).reshape(-1, 2)
+    spans = len(points) > 1  # a single point leaves the axes without extent
+    if implot.begin_plot(
+        "##noise",
+        (-1, LINES * imgui.get_text_line_height_with_spacing()),
+        implot.Flags_.no_legend.value | implot.Flags_.no_mouse_text.value,
+    ):
         fit = implot.AxisFlags_.auto_fit.value
         implot.setup_axes("seconds", "noise", fit, fit)
         for axis in (implot.ImAxis_.x1.value, implot.ImAxis_.y1.value) if spans else ():

@@ -26,8 +26,14 @@ from .phong import BlinnGloss, PhongGloss
 from .scattering import Scattering
 
 SCATTERINGS: dict[type[Material], Callable[[Any, Surface], Scattering]] = {
-    Diffuse: Lambertian, MetallicRoughness: CookTorrance, Mirror: Specular, Dielectric: Glass, Conductor: Metal,
-    Phong: PhongGloss, BlinnPhong: BlinnGloss}
+    Diffuse: Lambertian,
+    MetallicRoughness: CookTorrance,
+    Mirror: Specular,
+    Dielectric: Glass,
+    Conductor: Metal,
+    Phong: PhongGloss,
+    BlinnPhong: BlinnGloss,
+}
 
 
 def scattering_of(material: Material, at: Surface) -> Scattering:

@@ -46,7 +46,7 @@ def _table(smith: str) -> Doubles:
     for alpha in alpha_of(np.linspace(ROUGHNESS, 1, NODES)):
         row = np.array([bounces(root**2, alpha, smith)[1].sum(axis=0) for root in roots])
         # With the cosine c = root², the weight 2·c·dc is 4·root³·droot.
-        mean = (weights / 2 * 4 * roots[NODES:]**3) @ row[NODES:]
+        mean = (weights / 2 * 4 * roots[NODES:] ** 3) @ row[NODES:]
         rows.append(np.vstack([row[:NODES], mean]))
     return np.array(rows)
 
@@ -59,6 +59,6 @@ def bounces(cosine: float, alpha: float, smith: str) -> tuple[Doubles, Doubles]:
     alphas, cos_i = np.full(len(wo), alpha), reflected(wo, h)[:, 2]
     up = cos_i > 0
     seen = shadowing(wo[:, 2], np.where(up, cos_i, 1), alphas, smith)
-    weight = share * np.where(up, seen * (1 + smith_lambda(wo[:, 2], alphas)), 0)     # G2/G1
-    grazing = np.maximum(1 - dot(wo, h), 0)**5
+    weight = share * np.where(up, seen * (1 + smith_lambda(wo[:, 2], alphas)), 0)  # G2/G1
+    grazing = np.maximum(1 - dot(wo, h), 0) ** 5
     return np.maximum(cos_i, 0), weight[:, None] * np.column_stack([1 - grazing, grazing])

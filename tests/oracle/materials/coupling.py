@@ -36,8 +36,9 @@ class Lobe:
 
     def __init__(self, f: OfCosine, rows: int) -> None:
         self._f = f
-        self._mean: Doubles = np.asarray(sum(2 * weight * root**3 * f(np.full(rows, root**2))
-                                             for root, weight in zip(ROOTS, WEIGHTS)))
+        self._mean: Doubles = np.asarray(
+            sum(2 * weight * root**3 * f(np.full(rows, root**2)) for root, weight in zip(ROOTS, WEIGHTS))
+        )
 
     def __call__(self, wo: Doubles, wi: Doubles) -> Doubles:
         """Return the lobe (n, c) for f (n, c)."""
@@ -52,8 +53,9 @@ def by_half_vector(substance: Substance, wo: Doubles, wi: Doubles) -> Doubles:
 
 def by_fresnel(substance: Substance, wo: Doubles, wi: Doubles) -> Doubles:
     """Return f·π without layers, (n, 3)."""
-    return np.asarray((1 - substance.gloss.at(wo[:, 2])) * (1 - substance.gloss.at(np.maximum(wi[:, 2], 0)))
-                      * substance.body)
+    return np.asarray(
+        (1 - substance.gloss.at(wo[:, 2])) * (1 - substance.gloss.at(np.maximum(wi[:, 2], 0))) * substance.body
+    )
 
 
 class ByAlbedo:

@@ -40,9 +40,9 @@ class Glass(Scattering):
         if not self.thin:
             return np.tile(f, (1, 3)), (1 - f) * c
         # All bounces between the faces: a geometric series.
-        between = 1 - (c * f)**2
+        between = 1 - (c * f) ** 2
         safe = np.where(between > 0, between, 1)
-        return f + (1 - f)**2 * c**2 * f / safe, (1 - f)**2 * c / safe
+        return f + (1 - f) ** 2 * c**2 * f / safe, (1 - f) ** 2 * c / safe
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
         same_side = wi[:, 2:] > 0
@@ -88,7 +88,7 @@ class Glass(Scattering):
         crosses = (cos_o > 0) & (cos_i < 0) & (wi[:, 2] < 0)
         _, on = self.parts(fresnel.dielectric(np.abs(cos_o), self.eta)[0])
         g = shadowing(wo[:, 2], np.maximum(-wi[:, 2], 1e-300), self.alpha)
-        stretch = np.where(crosses, (cos_o + self.eta * cos_i)**2, 1)
+        stretch = np.where(crosses, (cos_o + self.eta * cos_i) ** 2, 1)
         f = np.abs(cos_i * cos_o) / wo[:, 2] * distribution(h, self.alpha) * g / stretch
         return on * np.where(crosses, f, 0)[:, None]
 

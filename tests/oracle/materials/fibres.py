@@ -40,7 +40,7 @@ class Fibres:
         up = wi[:, 2] > 0
         o, i = wo[:, 2], np.where(up, wi[:, 2], 1)
         cos_h = halfway(wo, np.where(up[:, None], wi, wo))[:, 2]
-        d = (2 + self._power) / (2 * np.pi) * np.maximum(1 - cos_h**2, 0)**(self._power / 2)
+        d = (2 + self._power) / (2 * np.pi) * np.maximum(1 - cos_h**2, 0) ** (self._power / 2)
         bound = np.maximum(np.maximum(self._albedos(o)[:, 0], self._albedos(i)[:, 0]), 1)
         return self.color * np.where(up, d * i / (4 * (o + i - o * i) * bound), 0)[:, None]
 
@@ -53,9 +53,9 @@ class Fibres:
 @cache
 def _table() -> Doubles:
     """Return (ROUGHNESSES, COSINES, 2): E, and the bounded E over min(E, 1), which has no kink at E = 1."""
-    cosines = np.maximum(np.linspace(0, 1, COSINES), 1e-3)**2
+    cosines = np.maximum(np.linspace(0, 1, COSINES), 1e-3) ** 2
     rows = []
-    for n in np.geomspace(SMOOTHEST, 1, ROUGHNESSES)**-2:
+    for n in np.geomspace(SMOOTHEST, 1, ROUGHNESSES) ** -2:
         unbounded = sheen.albedo(cosines, n)
         rows.append(np.column_stack([unbounded, sheen.bounded_albedo(cosines, n) / np.minimum(unbounded, 1)]))
     return np.array(rows)
@@ -64,7 +64,7 @@ def _table() -> Doubles:
 def across(cosine: float, roughness: float) -> tuple[Doubles, Doubles]:
     """Return the reflection of light from an angle by white sheen as a quadrature: outgoing
     cosines (m,) and weights (m, 1)."""
-    n, cosines = max(roughness, SMOOTHEST)**-2, np.array([cosine])
+    n, cosines = max(roughness, SMOOTHEST) ** -2, np.array([cosine])
     bound = np.maximum(np.maximum(sheen.albedo(cosines, n), _albedos_there(n)), 1)
     return sheen.COS_I, (sheen.across(cosines, n)[0] * sheen.WEIGHT / bound)[:, None]
 

@@ -23,9 +23,9 @@ def conductor(cosine: Doubles, eta: Doubles, k: Doubles) -> Doubles:
     cos_t = np.sqrt(1 - (1 - c**2) / index**2)
     perpendicular = (c - index * cos_t) / (c + index * cos_t)
     parallel = (index * c - cos_t) / (index * c + cos_t)
-    return np.asarray((np.abs(perpendicular)**2 + np.abs(parallel)**2) / 2)
+    return np.asarray((np.abs(perpendicular) ** 2 + np.abs(parallel) ** 2) / 2)
 
 
 def schlick(cosine: Doubles, f0: Doubles, f90: Doubles) -> Doubles:
     """Return F (n, 3) from f0 (n, 3) at normal incidence and f90 (n, 3) at grazing angles (Schlick 1994)."""
-    return np.asarray(f0 + (f90 - f0) * (1 - np.clip(cosine, 0, 1)[:, None])**5)
+    return np.asarray(f0 + (f90 - f0) * (1 - np.clip(cosine, 0, 1)[:, None]) ** 5)

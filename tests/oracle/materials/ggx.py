@@ -20,8 +20,8 @@ def alpha_of(roughness: Doubles) -> Doubles:
 
 def distribution(h: Doubles, alpha: Doubles) -> Doubles:
     """Return D (Walter 2007, eq. 33)."""
-    z2 = h[:, 2]**2
-    return np.where(h[:, 2] > 0, alpha**2 / (np.pi * (1 - z2 + alpha**2 * z2)**2), 0)
+    z2 = h[:, 2] ** 2
+    return np.where(h[:, 2] > 0, alpha**2 / (np.pi * (1 - z2 + alpha**2 * z2) ** 2), 0)
 
 
 def smith_lambda(cosine: Doubles, alpha: Doubles) -> Doubles:
@@ -34,7 +34,7 @@ def shadowing(cos_o: Doubles, cos_i: Doubles, alpha: Doubles, smith: str = "heig
     """Return G2 on one side: Heitz 2014, eq. 99 (height-correlated) and 98 (separable); Schlick's form with k of
     (roughness + 1)²/8 or alpha/2 (Karis 2013, "Real Shading in Unreal Engine 4")."""
     if smith.startswith("schlick"):
-        k = alpha / 2 if smith == "schlick_ibl" else (np.sqrt(alpha) + 1)**2 / 8
+        k = alpha / 2 if smith == "schlick_ibl" else (np.sqrt(alpha) + 1) ** 2 / 8
         return np.asarray(cos_o / (cos_o * (1 - k) + k) * cos_i / (cos_i * (1 - k) + k))
     lambda_o, lambda_i = smith_lambda(cos_o, alpha), smith_lambda(cos_i, alpha)
     if smith == "separable":
@@ -95,7 +95,7 @@ def visible_nodes(cosine: float, alpha: float, count: int) -> tuple[Doubles, Dou
     """
     x, weights = np.polynomial.legendre.leggauss(count)
     angle, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(count) + 0.5) / count, indexing="ij")
-    u = np.column_stack([np.sin(angle).ravel()**2, turn.ravel()])
+    u = np.column_stack([np.sin(angle).ravel() ** 2, turn.ravel()])
     wo = np.tile([np.sqrt(1 - cosine**2), 0.0, cosine], (len(u), 1))
     share = (np.sin(2 * angle) * weights[:, None] * np.pi / 4 / count).ravel()
     return wo, visible_normals(wo, np.full(len(u), alpha), u), share

@@ -44,8 +44,8 @@ class Energy:
 
 @cache
 def _table(ior: float, thin: bool) -> Doubles:
-    """Return the table (roughnesses, cosines, 4) of loss and rest outside, then inside, with means in the last column.
-    """
+    """Return the table (roughnesses, cosines, 4) of loss and rest outside, then inside, with means in the last
+    column."""
     x, weights = np.polynomial.legendre.leggauss(4 * NODES)
     between = (x + 1) / 2
     nodes, rows = np.linspace(0, 1, NODES), []
@@ -59,13 +59,17 @@ def _table(ior: float, thin: bool) -> Doubles:
 def _sides(ior: float, thin: bool, alpha: float) -> Doubles:
     """Return loss and rest (cosines, 4) of one roughness."""
     roots, etas = np.linspace(0, 1, NODES), [np.inf] if thin else [ior, 1 / ior]
-    bounces = [[_bounce(max(root, 1e-3)**2, alpha, eta) for root in roots] for eta in etas]
+    bounces = [[_bounce(max(root, 1e-3) ** 2, alpha, eta) for root in roots] for eta in etas]
     losses = [np.array([1 - back.sum() - on.sum() for back, on, _, _ in side]) for side in bounces]
     found = []
     for side, own, other in zip(bounces, losses, losses[::-1]):
-        kept = [sum(np.sum(part / (1 - np.minimum(loss, np.interp(np.sqrt(np.maximum(cosine, 0)), roots, beyond))))
-                    for part, cosine, beyond in ((back, cos_back, own), (on, cos_on, other)))
-                for (back, on, cos_back, cos_on), loss in zip(side, own)]
+        kept = [
+            sum(
+                np.sum(part / (1 - np.minimum(loss, np.interp(np.sqrt(np.maximum(cosine, 0)), roots, beyond))))
+                for part, cosine, beyond in ((back, cos_back, own), (on, cos_on, other))
+            )
+            for (back, on, cos_back, cos_on), loss in zip(side, own)
+        ]
         found += [own, np.maximum(1 - np.array(kept), 0)]
     return np.array(found if len(found) == 4 else found * 2).T
 

@@ -44,4 +44,5 @@ def layers_of(material: MetallicRoughness, at: Surface) -> Layers:
     has_film, has_fibres = material.clearcoat != 0, material.sheen_color != (0, 0, 0)
     return Layers(
         Film(at.number(material.clearcoat), at.number(material.clearcoat_roughness)) if has_film else None,
-        Fibres(at.color(material.sheen_color), at.number(material.sheen_roughness)) if has_fibres else None)
+        Fibres(at.color(material.sheen_color), at.number(material.sheen_roughness)) if has_fibres else None,
+    )

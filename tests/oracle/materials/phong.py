@@ -52,7 +52,7 @@ class BlinnGloss(Glossy):
 
     def lobe(self, wo: Doubles, wi: Doubles) -> Doubles:
         n, cosine = self._n, np.clip(halfway(wo, wi)[:, 2], 0, 1)
-        return np.asarray((n + 2) * (n + 4) / (8 * np.pi * (2**(-n / 2) + n)) * cosine**n)
+        return np.asarray((n + 2) * (n + 4) / (8 * np.pi * (2 ** (-n / 2) + n)) * cosine**n)
 
 
 class AroundMirrored:
@@ -66,7 +66,7 @@ class AroundMirrored:
 
     def density(self, wo: Doubles, wi: Doubles) -> Doubles:
         cosine = dot(wo * [-1.0, -1.0, 1.0], wi)
-        return np.where(cosine > 0, (self._n + 1) / (2 * np.pi) * np.maximum(cosine, 0)**self._n, 0)
+        return np.where(cosine > 0, (self._n + 1) / (2 * np.pi) * np.maximum(cosine, 0) ** self._n, 0)
 
 
 class AtPowerNormals:
@@ -81,5 +81,5 @@ class AtPowerNormals:
     def density(self, wo: Doubles, wi: Doubles) -> Doubles:
         h = halfway(wo, wi)
         h = np.where(h[:, 2:] < 0, -h, h)
-        d, cosine = (self._n + 1) / (2 * np.pi) * h[:, 2]**self._n, dot(wo, h)
+        d, cosine = (self._n + 1) / (2 * np.pi) * h[:, 2] ** self._n, dot(wo, h)
         return np.divide(d, 4 * cosine, out=np.zeros_like(d), where=cosine > 1e-12)

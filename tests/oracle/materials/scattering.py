@@ -107,6 +107,6 @@ def halfway(wo: Doubles, wi: Doubles) -> Doubles:
 
 def power_directions(n: float | Doubles, u: Doubles) -> Doubles:
     """Return directions around +z with a density of (n + 1)/2π·cosⁿ; u (k, 2) in [0, 1)."""
-    z = u[:, 0]**(1 / (n + 1))
+    z = u[:, 0] ** (1 / (n + 1))
     r, phi = np.sqrt(1 - z * z), 2 * np.pi * u[:, 1]
     return np.column_stack([r * np.cos(phi), r * np.sin(phi), z])

@@ -41,7 +41,7 @@ class Substance:
 
     def __init__(self, material: MetallicRoughness, at: Surface) -> None:
         self.alpha, self.smith = alpha_of(at.number(material.roughness)), material.smith
-        base: Doubles = np.array(((material.ior - 1) / (material.ior + 1))**2)
+        base: Doubles = np.array(((material.ior - 1) / (material.ior + 1)) ** 2)
         self.color, self.metallic = at.tinted(material.color), at.number(material.metallic)[:, None]
         if material.preset is not None:
             f0, is_metal = F0_PRESETS[material.preset]
@@ -50,7 +50,8 @@ class Substance:
         specular = at.number(material.specular)[:, None]
         plastic = np.minimum(base * at.color(material.specular_color), 1) * specular
         self.dielectric = Fresnel(plastic, specular)
-        self.gloss = Fresnel(plastic + self.metallic * (self.color - plastic),
-                             specular + self.metallic * (1 - specular))
+        self.gloss = Fresnel(
+            plastic + self.metallic * (self.color - plastic), specular + self.metallic * (1 - specular)
+        )
         through = at.number(material.transmission)[:, None]
         self.body, self.passing = ((1 - self.metallic) * self.color * part for part in (1 - through, through))

@@ -25,7 +25,7 @@ from .layers import Layers
 Nodes = tuple[float, ...]
 
 #: Nodes of the cosine, and of textured roughnesses and strengths.
-COSINES: Nodes = tuple(np.linspace(1e-3, 1, 41)**2)
+COSINES: Nodes = tuple(np.linspace(1e-3, 1, 41) ** 2)
 ROUGHNESSES: Nodes = tuple(np.linspace(0.25, 1, 7))
 THREADS: Nodes = tuple(np.geomspace(0.1, 1, 7))
 STRENGTHS: Nodes = (0.0, 0.5, 1.0)
@@ -85,23 +85,29 @@ def _interpolated(table: Doubles, axes: list[Nodes], values: list[Doubles]) -> D
 @cache
 def _gloss(smith: str, *axes: Nodes) -> Doubles:
     """Return the table (..., 2) for gloss."""
-    found = [_lost(cosine, *bounces(cosine, base**2, smith), _layers(film, smooth, fibres, threads))
-             for base, film, smooth, fibres, threads, cosine in product(*axes)]
+    found = [
+        _lost(cosine, *bounces(cosine, base**2, smith), _layers(film, smooth, fibres, threads))
+        for base, film, smooth, fibres, threads, cosine in product(*axes)
+    ]
     return np.reshape(found, (*map(len, axes), 2))
 
 
 @cache
 def _sheen(*axes: Nodes) -> Doubles:
     """Return the table (..., 1) for sheen."""
-    found = [_lost(cosine, *across(cosine, threads), _layers(film, smooth, 0.0, 0.0))
-             for film, smooth, threads, cosine in product(*axes)]
+    found = [
+        _lost(cosine, *across(cosine, threads), _layers(film, smooth, 0.0, 0.0))
+        for film, smooth, threads, cosine in product(*axes)
+    ]
     return np.reshape(found, (*map(len, axes), 1))
 
 
 def _layers(film: float, smooth: float, fibres: float, threads: float) -> Layers:
     """Return layers at a single point."""
-    return Layers(Film(np.array([film]), np.array([smooth])) if film else None,
-                  Fibres(np.full((1, 3), fibres), np.array([threads])) if fibres else None)
+    return Layers(
+        Film(np.array([film]), np.array([smooth])) if film else None,
+        Fibres(np.full((1, 3), fibres), np.array([threads])) if fibres else None,
+    )
 
 
 def _lost(cosine: float, cos_i: Doubles, weights: Doubles, layers: Layers) -> Doubles:

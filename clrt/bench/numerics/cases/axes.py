@@ -35,15 +35,23 @@ def _onto_plane(subject: Subject, count: int) -> Iterator[Row]:
     query = subject.query(mesh)
     corners = mesh[0][rng.integers(0, len(mesh[0]), count)].astype(np.float64)
     targets = {"vertices": corners, "anywhere": rng.uniform(0, SIDE, (count, 3)) * [1, 0, 1]}
-    ways = {"straight": np.tile([0, -1, 0], (count, 1)).astype(np.float64),
-            "aslant": np.column_stack([rng.integers(-2, 3, count), np.full(count, -1), rng.integers(-2, 3, count)])}
+    ways = {
+        "straight": np.tile([0, -1, 0], (count, 1)).astype(np.float64),
+        "aslant": np.column_stack([rng.integers(-2, 3, count), np.full(count, -1), rng.integers(-2, 3, count)]),
+    }
     for target, points in targets.items():
         for way, directions in ways.items():
             points = np.round(points * 1024) / 1024
             hits = query.closest_hit(*endless(points - HEIGHT * directions, directions))
             off = ulps(hits["t"], np.full(count, HEIGHT))
-            yield Row("G7", f"{way} onto a plane of {len(mesh[1])} triangles, {target}", count,
-                      int(np.count_nonzero(hits["primitive"] < 0)), float(off[np.isfinite(off)].max(initial=0)), "ulp")
+            yield Row(
+                "G7",
+                f"{way} onto a plane of {len(mesh[1])} triangles, {target}",
+                count,
+                int(np.count_nonzero(hits["primitive"] < 0)),
+                float(off[np.isfinite(off)].max(initial=0)),
+                "ulp",
+            )
 
 
 def lattice() -> Mesh:
@@ -58,7 +66,7 @@ def lattice() -> Mesh:
 
 def plane(side: int) -> Mesh:
     """Return 2·side² triangles with integer vertices that fill the square [0, side]² of the plane y = 0."""
-    z, x = np.divmod(np.arange((side + 1)**2), side + 1)
+    z, x = np.divmod(np.arange((side + 1) ** 2), side + 1)
     corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()[:, None]
     faces = np.concatenate([corner + [0, side + 1, side + 2], corner + [0, side + 2, 1]])
     return np.column_stack([x, 0 * x, z]).astype(np.float32), faces.astype(np.int32)

@@ -25,8 +25,14 @@ def measure_degenerate(subject: Subject, *, quick: bool) -> Iterator[Row]:
         for builder in (None, "midpoint"):
             query = subject.query(mesh, builder=builder)
             wrong = closest_bounds(*mesh, rays).wrong(rays, query.closest_hit(*rays))
-            yield Row("G8", f"{name}, {len(mesh[1])} triangles, {builder or 'default'} BVH", count,
-                      int(np.count_nonzero(wrong)), query.tree.stack, "entries")
+            yield Row(
+                "G8",
+                f"{name}, {len(mesh[1])} triangles, {builder or 'default'} BVH",
+                count,
+                int(np.count_nonzero(wrong)),
+                query.tree.stack,
+                "entries",
+            )
     refused = [_is_refused(subject, mesh) for mesh in no_meshes().values()]
     yield Row("G12", f"refused: {', '.join(no_meshes())}", len(refused), refused.count(False))
 
@@ -40,14 +46,18 @@ def meshes() -> dict[str, Mesh]:
     centered = np.concatenate([centered, -centered.sum(axis=1, keepdims=True)], axis=1)
     ball = bumpy_ball(2)
     return {
-        "no triangle": loose(few[:0]), "one triangle": loose(few),
+        "no triangle": loose(few[:0]),
+        "one triangle": loose(few),
         "points": loose(np.repeat(corners[:, :1], 3, axis=1)),
-        "needles": loose(corners[:, [0, 1, 1]]), "copies": loose(np.repeat(corners, COPIES, axis=0)),
-        "one centroid": loose(centered), "soup": soup(600),
+        "needles": loose(corners[:, [0, 1, 1]]),
+        "copies": loose(np.repeat(corners, COPIES, axis=0)),
+        "one centroid": loose(centered),
+        "soup": soup(600),
         "a far vertex that no face uses": (np.concatenate([ball[0], [[1e6, 1e6, 1e6]]]).astype(np.float32), ball[1]),
         "teapot in a stadium": loose(np.concatenate([1e-4 * corners, 1e3 * (corners[:12] - 0.5)])),
-        "long diagonals": loose(np.linspace(0, 1, 500)[:, None, None] * [1, 1, 0]
-                                + [[0, 0, 0], [9, 9, 9], [9, 9, 9.1]]),
+        "long diagonals": loose(
+            np.linspace(0, 1, 500)[:, None, None] * [1, 1, 0] + [[0, 0, 0], [9, 9, 9], [9, 9, 9.1]]
+        ),
         "sizes from 1e-15 to 1e15": loose(10 ** np.linspace(-15, 15, 400)[:, None, None] * corners[:1]),
     }
 
@@ -56,9 +66,11 @@ def no_meshes() -> dict[str, Mesh]:
     """Return invalid meshes by name."""
     vertices, faces = bumpy_ball(0)
     bad = {"NaN": np.nan, "infinity": np.inf}
-    return {**{name: (_with(vertices, value), faces) for name, value in bad.items()},
-            "an index past the end": (vertices, _with(faces, len(vertices))),
-            "a negative index": (vertices, _with(faces, -1))}
+    return {
+        **{name: (_with(vertices, value), faces) for name, value in bad.items()},
+        "an index past the end": (vertices, _with(faces, len(vertices))),
+        "a negative index": (vertices, _with(faces, -1)),
+    }
 
 
 def loose(corners: np.ndarray) -> Mesh:

@@ -47,11 +47,16 @@ def lit_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str, 
     scenes = {"level plane": level, "grazed plane": replace(level, lights=[_light(LEVEL, [1, 0.01, 0.2])])}
     if level_only:
         return scenes
-    sphere = replace(_scene(place, factor, LEVEL, PLANE, [0.2, 3, 0.3], [0.2, 3, 0.3]), meshes=[],
-                     spheres=[Sphere(center=_tuple(place.astype(np.float32)), radius=factor)])
-    return scenes | {"tilted plane": _scene(place, factor, TILTED, PLANE, [0.3, 1, 0.2], [0.2, 2, 0.3]),
-                     "corner of two walls": _scene(place, factor, TILTED, WALLS, [0.5, 1, 0], [1, 1.2, 0.1]),
-                     "sphere": replace(sphere, camera=replace(sphere.camera, fov_degrees=25))}
+    sphere = replace(
+        _scene(place, factor, LEVEL, PLANE, [0.2, 3, 0.3], [0.2, 3, 0.3]),
+        meshes=[],
+        spheres=[Sphere(center=_tuple(place.astype(np.float32)), radius=factor)],
+    )
+    return scenes | {
+        "tilted plane": _scene(place, factor, TILTED, PLANE, [0.3, 1, 0.2], [0.2, 2, 0.3]),
+        "corner of two walls": _scene(place, factor, TILTED, WALLS, [0.5, 1, 0], [1, 1.2, 0.1]),
+        "sphere": replace(sphere, camera=replace(sphere.camera, fov_degrees=25)),
+    }
 
 
 def held_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str, Scene]:
@@ -61,8 +66,11 @@ def held_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str,
         level = lit_scenes(place, factor, level_only=True)["level plane"]
         return {"ground a million times as large": replace(level, meshes=[], spheres=[ground])}
     ball = Sphere(center=_tuple(-place), radius=0.5 * factor)
-    return {f"{name} and a far sphere": replace(scene, spheres=[*scene.spheres, ball])
-            for name, scene in lit_scenes(place, factor, level_only=level_only).items() if "corner" not in name}
+    return {
+        f"{name} and a far sphere": replace(scene, spheres=[*scene.spheres, ball])
+        for name, scene in lit_scenes(place, factor, level_only=level_only).items()
+        if "corner" not in name
+    }
 
 
 def dark_box(place: Doubles, factor: float) -> Scene:
@@ -72,8 +80,9 @@ def dark_box(place: Doubles, factor: float) -> Scene:
     faces = np.concatenate([sides[:, [0, 1, 2]], sides[:, [0, 2, 3]]]).astype(np.int32)
     box = Mesh((place + 2 * factor * corners).astype(np.float32), faces)
     camera = replace(_camera(place, factor, LEVEL, [0.5, 0.4, 0.3]), fov_degrees=120)
-    return Scene(meshes=[box], camera=camera, environment=Environment(color=(1, 1, 1)),
-                 render=RenderSettings(max_depth=8))
+    return Scene(
+        meshes=[box], camera=camera, environment=Environment(color=(1, 1, 1)), render=RenderSettings(max_depth=8)
+    )
 
 
 #: PLANE: a triangle around the origin in the plane y = 0; WALLS: two triangles, walls at x = 0 and y = 0.
@@ -81,12 +90,17 @@ PLANE = np.array([[[-20, 0, -12], [0, 0, 24], [20, 0, -12]]])
 WALLS = np.array([[[0, 0, -20], [0, 0, 20], [40, 0, 0]], [[0, 0, -20], [0, 40, 0], [0, 0, 20]]])
 
 
-def _scene(place: Doubles, factor: float, frame: Doubles, triangles: Doubles, light: list[float],
-           camera: list[float]) -> Scene:
+def _scene(
+    place: Doubles, factor: float, frame: Doubles, triangles: Doubles, light: list[float], camera: list[float]
+) -> Scene:
     points = (place + factor * triangles.reshape(-1, 3) @ frame).astype(np.float32)
     faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
-    return Scene(meshes=[Mesh(points, faces, Diffuse(color=(0.5, 0.5, 0.5)))], lights=[_light(frame, light)],
-                 camera=_camera(place, factor, frame, camera), render=RenderSettings(integrator="direct"))
+    return Scene(
+        meshes=[Mesh(points, faces, Diffuse(color=(0.5, 0.5, 0.5)))],
+        lights=[_light(frame, light)],
+        camera=_camera(place, factor, frame, camera),
+        render=RenderSettings(integrator="direct"),
+    )
 
 
 def _light(frame: Doubles, towards: list[float]) -> DirectionalLight:
@@ -94,8 +108,11 @@ def _light(frame: Doubles, towards: list[float]) -> DirectionalLight:
 
 
 def _camera(place: Doubles, factor: float, frame: Doubles, position: list[float]) -> Camera:
-    return Camera(position=_tuple(place + factor * np.asarray(position) @ frame), look_at=_tuple(place),
-                  up=_tuple(np.array([0, 0, 1]) @ frame))
+    return Camera(
+        position=_tuple(place + factor * np.asarray(position) @ frame),
+        look_at=_tuple(place),
+        up=_tuple(np.array([0, 0, 1]) @ frame),
+    )
 
 
 def _tuple(vector: Doubles) -> tuple[float, float, float]:

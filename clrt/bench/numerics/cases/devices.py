@@ -22,8 +22,14 @@ def measure_devices(devices: list[int], *, quick: bool) -> Iterator[Row]:
     first, *others = (Subject(device).picture(scene, 4 if quick else 16).astype(np.float64) for device in devices)
     for device, picture in zip(devices[1:], others):
         differ = np.abs(picture - first).max(axis=2) > ROUNDING * (first.max(axis=2) + 1e-3)
-        yield Row("M1", f"device {device} against {devices[0]}: pixels of another path", differ.size,
-                  int(np.count_nonzero(differ)), abs(float(picture.mean() / first.mean()) - 1), "of the mean")
+        yield Row(
+            "M1",
+            f"device {device} against {devices[0]}: pixels of another path",
+            differ.size,
+            int(np.count_nonzero(differ)),
+            abs(float(picture.mean() / first.mean()) - 1),
+            "of the mean",
+        )
 
 
 def everything(size: tuple[int, int]) -> Scene:
@@ -31,10 +37,18 @@ def everything(size: tuple[int, int]) -> Scene:
     vertices, faces = bumpy_ball(3)
     sky = np.full((16, 32, 3), 0.5, np.float32)
     sky[4, 5] = 200
-    floor = Mesh(np.array([[-9, -1.2, -9], [-9, -1.2, 9], [9, -1.2, 9], [9, -1.2, -9]], np.float32),
-                 np.array([[0, 1, 2], [0, 2, 3]], np.int32), Diffuse(color=(0.6, 0.5, 0.4)))
-    return Scene(meshes=[Mesh(vertices, faces, MetallicRoughness(color=(0.9, 0.4, 0.2), roughness=0.4)), floor],
-                 spheres=[Sphere(center=(2.1, -0.2, 0), material=Mirror()),
-                          Sphere(center=(-2.1, -0.4, 0.3), radius=0.8, material=Diffuse(emission=(2, 3, 4)))],
-                 camera=Camera(position=(1.5, 1.2, 6), fov_degrees=45), environment=Environment(image=sky),
-                 render=RenderSettings(size=size, max_depth=6))
+    floor = Mesh(
+        np.array([[-9, -1.2, -9], [-9, -1.2, 9], [9, -1.2, 9], [9, -1.2, -9]], np.float32),
+        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        Diffuse(color=(0.6, 0.5, 0.4)),
+    )
+    return Scene(
+        meshes=[Mesh(vertices, faces, MetallicRoughness(color=(0.9, 0.4, 0.2), roughness=0.4)), floor],
+        spheres=[
+            Sphere(center=(2.1, -0.2, 0), material=Mirror()),
+            Sphere(center=(-2.1, -0.4, 0.3), radius=0.8, material=Diffuse(emission=(2, 3, 4))),
+        ],
+        camera=Camera(position=(1.5, 1.2, 6), fov_degrees=45),
+        environment=Environment(image=sky),
+        render=RenderSettings(size=size, max_depth=6),
+    )

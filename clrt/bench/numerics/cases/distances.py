@@ -35,8 +35,9 @@ def measure_distances(subject: Subject, *, quick: bool) -> Iterator[Row]:
             yield Row("G5", f"t {where}, 99.9 %", len(t), lost, float(np.quantile(errors, 0.999)), "ulp")
 
 
-def distances(subject: Subject, distance: float, angle_degrees: float,
-              count: int) -> tuple[NDArray[np.float32], Doubles, NDArray[np.bool_]]:
+def distances(
+    subject: Subject, distance: float, angle_degrees: float, count: int
+) -> tuple[NDArray[np.float32], Doubles, NDArray[np.bool_]]:
     """Return computed t, exact t, and whether there must be a hit, for `count` rays of unit direction at a triangle.
 
     angle_degrees: between the rays and the triangle's normal. exact: by the plane equation.

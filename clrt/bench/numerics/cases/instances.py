@@ -27,8 +27,14 @@ def measure_instances(subject: Subject, *, quick: bool) -> Iterator[Row]:
     count = 1 << (10 if quick else 14)
     vertices, faces = bumpy_ball(1)
     for kind, transforms in transforms_of_kinds().items():
-        query = InstancedRayQuery([(vertices, faces)], np.zeros(len(transforms), np.int32), transforms,
-                                  device=subject.device, layout=subject.layout, triangle=subject.triangle)
+        query = InstancedRayQuery(
+            [(vertices, faces)],
+            np.zeros(len(transforms), np.int32),
+            transforms,
+            device=subject.device,
+            layout=subject.layout,
+            triangle=subject.triangle,
+        )
         baked = transforms[:, None, :, 3] + np.einsum("kij,nj->kni", transforms[..., :3], vertices.astype(np.float64))
         first = len(vertices) * np.arange(len(transforms))[:, None, None]
         world = baked.reshape(-1, 3), (faces + first).reshape(-1, 3)
@@ -50,8 +56,10 @@ def lit_plane(to_world: Doubles) -> Scene:
     for _ in range(SUBDIVISIONS):
         vertices, faces = subdivide(vertices, faces)
     mesh = transform_mesh(Mesh(vertices, faces, plane.material), np.linalg.inv(matrix))
-    instances = [Instance(mesh, np.column_stack([to_world[:, :3], to_world[:, 3] - depth * np.cross(*_edges(plane))]))
-                 for depth in (0.0, LOWER, 2 * LOWER)]
+    instances = [
+        Instance(mesh, np.column_stack([to_world[:, :3], to_world[:, 3] - depth * np.cross(*_edges(plane))]))
+        for depth in (0.0, LOWER, 2 * LOWER)
+    ]
     return replace(scene, meshes=[], instances=instances)
 
 
@@ -70,8 +78,16 @@ def transforms_of_kinds() -> dict[str, Doubles]:
     moves = rng.uniform(-8, 8, (INSTANCES, 3, 1))
     stretch = 10 ** rng.uniform(-1, 1, (INSTANCES, 1, 3))
     flat = np.where(np.arange(3) == 1, 1e-3, 1.0)
-    kinds = {"turned": turns, "stretched": turns * stretch, "mirrored": turns * [-1, 1, 1],
-             "nearly flat": turns * flat, "sheared": turns @ (stretch * turns[::-1]), "far away": turns}
+    kinds = {
+        "turned": turns,
+        "stretched": turns * stretch,
+        "mirrored": turns * [-1, 1, 1],
+        "nearly flat": turns * flat,
+        "sheared": turns @ (stretch * turns[::-1]),
+        "far away": turns,
+    }
     far = {"far away": 1e4 + moves}
-    return {kind: np.concatenate([linear, far.get(kind, moves)], axis=2).astype(np.float32).astype(np.float64)
-            for kind, linear in kinds.items()}
+    return {
+        kind: np.concatenate([linear, far.get(kind, moves)], axis=2).astype(np.float32).astype(np.float64)
+        for kind, linear in kinds.items()
+    }

@@ -34,12 +34,17 @@ def measure_scales(subject: Subject, *, quick: bool) -> Iterator[Row]:
     query, rng = subject.query((ball, faces)), np.random.default_rng(0)
     triangles = len(faces) - 12
     inside = inside_rays(ball[: ball.shape[0] - 8], faces[:triangles], count, rng)
-    yield Row("G3", "from inside a sphere with edges of 1e-7 of the scene", count,
-              int(np.count_nonzero(~_on(query.closest_hit(*inside)["primitive"], triangles))))
+    yield Row(
+        "G3",
+        "from inside a sphere with edges of 1e-7 of the scene",
+        count,
+        int(np.count_nonzero(~_on(query.closest_hit(*inside)["primitive"], triangles))),
+    )
     center, towards = ball[:-8].astype(np.float64).mean(axis=0), unit_vectors(rng, count)
     hits = query.closest_hit(*endless(center - 0.4 * towards, towards))
-    yield Row("G3", "from afar at the center of that sphere", count,
-              int(np.count_nonzero(~_on(hits["primitive"], triangles))))
+    yield Row(
+        "G3", "from afar at the center of that sphere", count, int(np.count_nonzero(~_on(hits["primitive"], triangles)))
+    )
 
 
 def tiny_ball_in_room() -> Mesh:

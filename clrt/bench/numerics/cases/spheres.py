@@ -46,8 +46,14 @@ def measure_spheres(subject: Subject, *, quick: bool) -> Iterator[Row]:
         for name, some in (("steep", both & (beside < STEEP * case.radius)), ("grazing", both)):
             if some.any():
                 errors = ulps(hits["t"][some], t[some].astype(np.float64))
-                yield Row("G10", f"{case.what}: t, {name}, largest", int(np.count_nonzero(some)), 0,
-                          float(errors.max()), "ulp")
+                yield Row(
+                    "G10",
+                    f"{case.what}: t, {name}, largest",
+                    int(np.count_nonzero(some)),
+                    0,
+                    float(errors.max()),
+                    "ulp",
+                )
 
 
 def cases(count: int) -> Iterator[Case]:
@@ -58,8 +64,13 @@ def cases(count: int) -> Iterator[Case]:
         yield _aimed(rng, f"radius 1 from {distance:g}", center, 1.0, np.tile(origin, (count, 1)))
     for radius in (1e5, 1e6, 1e7):
         eye = np.array([0.0, 1.5, 0.0])
-        yield _aimed(rng, f"a ground of radius {radius:g} from 1.5 above", np.array([0, -radius, 0]), radius,
-                     np.tile(eye, (count, 1)))
+        yield _aimed(
+            rng,
+            f"a ground of radius {radius:g} from 1.5 above",
+            np.array([0, -radius, 0]),
+            radius,
+            np.tile(eye, (count, 1)),
+        )
     inside = 0.999 * rng.random((count, 1)) * unit_vectors(rng, count)
     yield Case("from inside", origin, 1.0, inside, unit_vectors(rng, count))
 
@@ -67,8 +78,11 @@ def cases(count: int) -> Iterator[Case]:
 def _aimed(rng: np.random.Generator, what: str, center: Doubles, radius: float, origin: Doubles) -> Case:
     """Aim at points up to 1.1 radii off the center, as seen from the origin; half of them near 1 radius."""
     count = len(origin)
-    beside = np.where(np.arange(count) % 2, 1.1 * np.sqrt(rng.random(count)),
-                      1 + rng.choice([-1, 1], count) * 10 ** rng.uniform(-7, -1, count))
+    beside = np.where(
+        np.arange(count) % 2,
+        1.1 * np.sqrt(rng.random(count)),
+        1 + rng.choice([-1, 1], count) * 10 ** rng.uniform(-7, -1, count),
+    )
     to_center = center - origin
     distance = np.linalg.norm(to_center, axis=1)
     across = np.cross(to_center, unit_vectors(rng, count))

@@ -33,8 +33,7 @@ class Subject:
 
     def query(self, mesh: Mesh = NO_MESH, spheres: ArrayLike | None = None, **options: Any) -> RayQuery:
         """Return a query of the mesh and spheres; options: further arguments of RayQuery."""
-        options = {"device": self.device, "layout": self.layout, "triangle": self.triangle, "box": self.box,
-                   **options}
+        options = {"device": self.device, "layout": self.layout, "triangle": self.triangle, "box": self.box, **options}
         if spheres is not None:
             options |= {"spheres": spheres, "sphere": self.sphere}
         return RayQuery(*mesh, **options)
@@ -45,8 +44,15 @@ class Subject:
 
     def film(self, scene: Scene) -> Film:
         """Render the scene with its own settings and return the film."""
-        renderer = Renderer(scene, device=self.device, layout=self.layout, triangle=self.triangle, box=self.box,
-                            sphere=self.sphere, offset=self.offset)
+        renderer = Renderer(
+            scene,
+            device=self.device,
+            layout=self.layout,
+            triangle=self.triangle,
+            box=self.box,
+            sphere=self.sphere,
+            offset=self.offset,
+        )
         *_, last = renderer.passes(spp=scene.render.spp)
         return last.film
 

@@ -29,8 +29,12 @@ def measure_watertight(subject: Subject, *, quick: bool, rays: float = 1e8) -> I
     for name, mesh in meshes.items():
         for sizes, factor in PLACES:
             count = round(rays / (len(meshes) * len(PLACES)))
-            yield Row("G1", f"{name}, {len(mesh[1])} triangles, {words(sizes, factor)}", count,
-                      misses(subject, placed(mesh, sizes, factor), count))
+            yield Row(
+                "G1",
+                f"{name}, {len(mesh[1])} triangles, {words(sizes, factor)}",
+                count,
+                misses(subject, placed(mesh, sizes, factor), count),
+            )
 
 
 def placed(mesh: Mesh, sizes: float, factor: float) -> Mesh:

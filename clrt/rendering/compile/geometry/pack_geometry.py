@@ -35,7 +35,7 @@ def triangle_records(meshes: Sequence[Mesh], materials: NDArray[np.int32], light
     first = smooth = 0
     for mesh, material in zip(meshes, materials):
         count = len(mesh.faces)
-        own = records[first:first + count]
+        own = records[first : first + count]
         put_corners(own, "p", mesh.vertices, mesh.faces)
         own["material"] = material
         if mesh.normals is not None:
@@ -51,7 +51,7 @@ def normal_records(meshes: Sequence[Mesh]) -> NDArray[Any]:
     first = 0
     for mesh in meshes:
         if mesh.normals is not None:
-            put_corners(records[first:first + len(mesh.faces)], "n", mesh.normals, mesh.faces)
+            put_corners(records[first : first + len(mesh.faces)], "n", mesh.normals, mesh.faces)
             first += len(mesh.faces)
     return records
 
@@ -62,8 +62,9 @@ def put_corners(records: NDArray[Any], name: str, values: NDArray[np.float32], f
         records[f"{name}{corner}"] = np.take(values, faces[:, corner], axis=0)
 
 
-def sphere_records(spheres: NDArray[np.float32], materials: NDArray[np.int32],
-                   lights: NDArray[np.int32]) -> NDArray[Any]:
+def sphere_records(
+    spheres: NDArray[np.float32], materials: NDArray[np.int32], lights: NDArray[np.int32]
+) -> NDArray[Any]:
     """Return SPHERE records of spheres (s, 4). materials, lights: (s,) codes and numbers."""
     records = np.zeros(len(spheres), SPHERE)
     records["center"], records["radius"] = spheres[:, :3], spheres[:, 3]

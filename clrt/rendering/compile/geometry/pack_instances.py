@@ -41,8 +41,15 @@ class PackedInstances:
         self.to_world = np.array([*itself, *(instance.to_world for instance in instances)])
         self.mesh = np.concatenate([np.full(len(itself), len(self.meshes), np.int32), which])
 
-    def levels(self, device: Device | None, layout: str, builder: str | None, triangles: Triangles,
-               spheres: FloatArray, test: str) -> TwoLevelBvh:
+    def levels(
+        self,
+        device: Device | None,
+        layout: str,
+        builder: str | None,
+        triangles: Triangles,
+        spheres: FloatArray,
+        test: str,
+    ) -> TwoLevelBvh:
         """Return the BVHs over triangles, stored as above, and spheres (s, 4), which belong to the rest."""
         meshes = np.split(np.asarray(triangles), self.starts[1:])
         return TwoLevelBvh(device, layout, builder, meshes, self.mesh, test, spheres)

@@ -30,7 +30,7 @@ def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dic
             if uv is not None:
                 put_corners(texcoords[own, i], "uv", uv, mesh.faces)
         if mesh.colors is not None:
-            colors[own, :, :mesh.colors.shape[1]] = mesh.colors[mesh.faces]
+            colors[own, :, : mesh.colors.shape[1]] = mesh.colors[mesh.faces]
         if mesh.material.bent_by is not None and normal_maps:
             tangent, sign = corner_tangents(mesh, mesh.material.bent_by)
             for i in range(3):

@@ -60,7 +60,9 @@ def pack_sky(environment: Environment) -> EnvironmentMap:
     texels = np.zeros((height, width), SKY_TEXEL)
     mean = _fill_radiance(texels, image, environment.strength)
     buffers: dict[str, tuple[str, NDArray[Any]]] = {
-        "environment": ("Environment", record), "sky_texels": ("SkyTexel", texels.ravel())}
+        "environment": ("Environment", record),
+        "sky_texels": ("SkyTexel", texels.ravel()),
+    }
     solid_angle = _solid_angles(height, width)
     total = np.sum(mean * solid_angle)
     overall = total / (4 * np.pi)
@@ -72,10 +74,10 @@ def pack_sky(environment: Environment) -> EnvironmentMap:
     weights *= solid_angle
     of_rows = weights.sum(axis=1)
     irradiance = _irradiance(weights, angle)
-    weights[of_rows == 0] = 1       # never sampled
+    weights[of_rows == 0] = 1  # never sampled
     table = np.empty(height * width + height, SKY_STEP)
-    density = steps(weights, table[:height * width].reshape(height, width))
-    density *= steps(of_rows[None], table[height * width:][None]).T
+    density = steps(weights, table[: height * width].reshape(height, width))
+    density *= steps(of_rows[None], table[height * width :][None]).T
     texels["density"] = density * (width * height)
     buffers["sky_steps"] = ("SkyStep", table)
     return EnvironmentMap("light/image_sky.cl", buffers, irradiance)

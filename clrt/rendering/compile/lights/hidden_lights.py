@@ -16,7 +16,7 @@ from ....scene.materials.material import Material
 
 def hidden_lights(shapes: NDArray[np.float64], opaque: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which of n shapes, (n, k) numbers that define each, equal an earlier one that is opaque; opaque: (n,)."""
-    rows = np.ascontiguousarray(shapes + 0.0).view(np.uint64).reshape(shapes.shape)    # + 0.0: -0 becomes 0
+    rows = np.ascontiguousarray(shapes + 0.0).view(np.uint64).reshape(shapes.shape)  # + 0.0: -0 becomes 0
     factors = np.random.default_rng(0).integers(1 << 62, size=shapes.shape[1]).astype(np.uint64) * 2 + 1
     _, group = np.unique((rows * factors).sum(axis=1, dtype=np.uint64), return_inverse=True)
     number = np.arange(len(rows))

@@ -61,8 +61,9 @@ def round_lights(center: Doubles, radius: Doubles, intensity: Doubles) -> LightG
     around = radius[:, None]
     everywhere = -np.ones(len(center))
     smaller = np.maximum(radius - SMALLER * (np.linalg.norm(center, axis=1) + radius), 0)
-    return LightGroups(center - around, center + around, smaller, np.zeros_like(center), everywhere, intensity,
-                       0 * everywhere)
+    return LightGroups(
+        center - around, center + around, smaller, np.zeros_like(center), everywhere, intensity, 0 * everywhere
+    )
 
 
 def placed_lights(bounds: Sequence[Bounds]) -> LightGroups:
@@ -74,8 +75,15 @@ def placed_lights(bounds: Sequence[Bounds]) -> LightGroups:
     cos_outer = 1 - _float32([1.0 if each.height is None else each.height for each in bounds])
     reach = np.cos(np.minimum(np.arccos(np.clip(cos_outer, -1, 1)) + WIDER, np.pi / 2)) - LESS
     around = radius[:, None]
-    return LightGroups(center - around, center + around, radius, axis, cos_cone, intensity.reshape(-1, 3) @ LUMINANCE,
-                       np.maximum(reach, 0))
+    return LightGroups(
+        center - around,
+        center + around,
+        radius,
+        axis,
+        cos_cone,
+        intensity.reshape(-1, 3) @ LUMINANCE,
+        np.maximum(reach, 0),
+    )
 
 
 def distant_lights(bounds: Sequence[DistantBounds]) -> Doubles:

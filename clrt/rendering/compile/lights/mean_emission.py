@@ -49,12 +49,12 @@ def _texels(at: Doubles, size: int, wrap: Wrap) -> tuple[NDArray[np.int64], NDAr
     """
     if wrap == "clamp":
         at = np.clip(at, 0, size)
-    else:   # by whole images, so that the first corner lies inside, or in the mirrored one after it
+    else:  # by whole images, so that the first corner lies inside, or in the mirrored one after it
         period = size if wrap == "repeat" else 2 * size
         at = at - np.floor(at[:, :1] / period) * period
         at = np.where(at[:, :1] >= size, 2 * size - at, at)
     low, high = np.floor(at.min(axis=1) - 1).astype(np.int64), np.ceil(at.max(axis=1) + 1).astype(np.int64)
-    if wrap == "clamp":     # beyond the edge are its own texels
+    if wrap == "clamp":  # beyond the edge are its own texels
         low, high = np.maximum(low, 0), np.minimum(high, size)
     outside = (low < 0) | (high > size)
     return np.where(outside, 0, low), np.where(outside, size, high)

@@ -63,10 +63,13 @@ def pack_emitters(scene: Scene, sky: EnvironmentMap, textures: PackedTextures) -
     if sky.irradiance is not None:
         counts["sky"], infinite = 1, np.vstack([infinite, sky.irradiance])
     radius = _doubles(balls, "radius")
-    groups = joined([
-        flat.groups,
-        round_lights(_doubles(balls, "center"), radius, np.pi * radius**2 * _luminance(balls, "radiance")),
-        placed_lights([each for each in bounds if isinstance(each, Bounds)])])
+    groups = joined(
+        [
+            flat.groups,
+            round_lights(_doubles(balls, "center"), radius, np.pi * radius**2 * _luminance(balls, "radiance")),
+            placed_lights([each for each in bounds if isinstance(each, Bounds)]),
+        ]
+    )
     choice = pack_choice(groups, infinite)
     buffers = {f"{kind}_lights": (f"{kind.title()}Light", records[kind]) for kind in counts if kind != "sky"}
     features = frozenset[str]().union(*(light.features() for own in lights.values() for light in own))

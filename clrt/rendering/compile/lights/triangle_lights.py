@@ -25,8 +25,8 @@ Integers = NDArray[np.int64]
 
 
 class TriangleLights(NamedTuple):
-    """Packed triangle lights. records: of n lights. groups: light bounds. light: (m,) int32, of each triangle, or −1.
-    """
+    """Packed triangle lights. records: of n lights. groups: light bounds. light: (m,) int32, of each triangle, or
+    −1."""
 
     records: NDArray[Any]
     groups: LightGroups
@@ -43,8 +43,13 @@ def pack_triangle_lights(meshes: list[Mesh], textures: PackedTextures) -> Triang
     mesh = np.repeat(np.arange(len(meshes)), [len(each.faces) for each in meshes])
     emission = np.array([each.material.radiance for each in meshes], np.float64).reshape(-1, 3)
     uneven = np.array([isinstance(each.material.emission, Texture) or _fades(each) for each in meshes], bool)
-    texture = np.array([textures.number(each.material.emission) if isinstance(each.material.emission, Texture) else -1
-                        for each in meshes], np.int32)
+    texture = np.array(
+        [
+            textures.number(each.material.emission) if isinstance(each.material.emission, Texture) else -1
+            for each in meshes
+        ],
+        np.int32,
+    )
     shines: NDArray[np.bool_] = np.any(emission, axis=1)
     lamps = np.flatnonzero(shines[mesh])
     around = np.concatenate([np.ones((0, 3)), *map(mean_emission, itertools.compress(meshes, shines))])
@@ -71,8 +76,9 @@ def _fades(mesh: Mesh) -> bool:
     return isinstance(mesh.material.opacity, Texture) or (mesh.colors is not None and mesh.material.opacity != 1)
 
 
-def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles,
-            share: Doubles, both: NDArray[np.bool_]) -> tuple[NDArray[Any], LightGroups]:
+def _packed(
+    corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles, share: Doubles, both: NDArray[np.bool_]
+) -> tuple[NDArray[Any], LightGroups]:
     """Pack triangles with corners (n, 3, 3) or, where `whole` (n,), the parallelograms with these three corners.
 
     share: (n, 3), average fraction of the radiance that they emit. both: (n,), which emit from both sides.
@@ -96,8 +102,9 @@ def _normals(corners: Doubles) -> tuple[Doubles, Doubles]:
     return cross / np.where(norm > 0, norm, 1)[:, None], norm
 
 
-def _joined(corners: Doubles, mesh: Integers, face: Integers,
-            plain: NDArray[np.bool_]) -> tuple[Doubles, NDArray[np.bool_]]:
+def _joined(
+    corners: Doubles, mesh: Integers, face: Integers, plain: NDArray[np.bool_]
+) -> tuple[Doubles, NDArray[np.bool_]]:
     """Return which of k triangles form a parallelogram with the next one, (k,); no triangle is in two of them.
 
     Their corners, (k, 3, 3), are rotated to begin with the one that is not shared. mesh, face: (k,); plain: (k,), which

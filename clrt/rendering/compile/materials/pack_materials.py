@@ -72,8 +72,9 @@ class MaterialTables:
         return {"layer_entries": ("LayerParts", np.ascontiguousarray(entries).view(LAYER_PARTS).ravel())}
 
 
-def pack_materials(users: Iterable[Material], textures: PackedTextures, tables: MaterialTables,
-                   culling: Culling) -> PackedMaterials:
+def pack_materials(
+    users: Iterable[Material], textures: PackedTextures, tables: MaterialTables, culling: Culling
+) -> PackedMaterials:
     """Pack the materials of these users without duplicates, adding their textures to `textures` and their tables to
     `tables`; culling: back-face culling mode."""
     distinct: dict[type[Material], dict[Material, int]] = {}
@@ -92,12 +93,12 @@ def pack_materials(users: Iterable[Material], textures: PackedTextures, tables: 
         for name in textured:
             records[name] = -1
         for i, (material, named) in enumerate(zip(distinct[kind], values)):
-            plain = material.without_textures()     # fallback values, without textures
+            plain = material.without_textures()  # fallback values, without textures
             for name in records.dtype.names or ():
                 if name in named or getattr(plain, name, None) is not None:
                     value = named.get(name, getattr(plain, name, 0))
                     if isinstance(value, tuple):
-                        records[name][i, :len(value)] = value
+                        records[name][i, : len(value)] = value
                     else:
                         records[name][i] = value
         buffers[kind.kernel] = (kind.__name__, records)
@@ -106,8 +107,9 @@ def pack_materials(users: Iterable[Material], textures: PackedTextures, tables: 
     return PackedMaterials(np.array(codes, np.int32), buffers, reads, used, features)
 
 
-def _values(material: Material, textures: PackedTextures, tables: MaterialTables,
-            culling: Culling) -> dict[str, Number]:
+def _values(
+    material: Material, textures: PackedTextures, tables: MaterialTables, culling: Culling
+) -> dict[str, Number]:
     """Return the values of its record: a texture's factor and its number, a table's first entry."""
     parameters = material.parameters()
     parameters |= material.surface_parameters(culling)

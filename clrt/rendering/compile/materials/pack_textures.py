@@ -49,6 +49,8 @@ class PackedTextures:
             record["nearest"], record["uv_set"] = texture.filter == "nearest", texture.uv_set
             record["shift"] = 8 * get_args(Channel).index(texture.channel)
         table = linear_from_srgb(np.arange(256, dtype=np.float32) / np.float32(255))
-        return {"textures": ("Texture", records),
-                "texels": ("Texel", np.concatenate(self._texels).view(TEXEL)),
-                "srgb": ("Linear", table.view(LINEAR))}
+        return {
+            "textures": ("Texture", records),
+            "texels": ("Texel", np.concatenate(self._texels).view(TEXEL)),
+            "srgb": ("Linear", table.view(LINEAR)),
+        }
