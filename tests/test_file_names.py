@@ -22,8 +22,8 @@ spp = 1
 color = [1, 1, 1]
 [[sphere]]
 """
-#: Type hints that include a file name; `Picture` is compare's.
-FILE_NAME = re.compile(r"StrPath|PathLike|^Picture$")
+#: Type hints that include a file name; `AnyImage` is compare's.
+FILE_NAME = re.compile(r"StrPath|PathLike|^AnyImage$")
 
 
 class Named:
@@ -57,6 +57,7 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "read_image path": lambda image: clrt.read_image(image),
     "compare image": lambda image: clrt.compare(image, np.ones((8, 8, 3), np.float32)),
     "compare reference": lambda image: clrt.compare(np.ones((8, 8, 3), np.float32), image),
+    "render checkpoint": lambda new_ck: clrt.render(clrt.Scene(), spp=1, size=(8, 8), checkpoint=new_ck),
     "Image.save path": lambda new_png: clrt.Image(np.ones((8, 8, 3), np.float32)).save(new_png),
     "Renderer checkpoint": lambda new_ck: list(
         clrt.Renderer(clrt.Scene(spheres=[clrt.Sphere()]), spp=1, size=(8, 8), checkpoint=new_ck).passes()
@@ -67,13 +68,13 @@ CALLS: dict[str, Callable[[Any], Any]] = {
 
 def test_each_parameter_with_a_file_name_is_called_below() -> None:
     hints = {
-        f"{name} {parameter}": str(hint)
+        f"{name} {each.name}": str(each.annotation)
         for name, function in public()
-        for parameter, hint in function.__annotations__.items()
-        if parameter != "return"
+        for each in inspect.signature(function).parameters.values()
     }
     assert [each for each, hint in hints.items() if re.search(r"\bPath\b", hint)] == []
-    assert {each for each, hint in hints.items() if FILE_NAME.search(hint)} - {"Texture picture"} == set(CALLS)
+    named = {each for each, hint in hints.items() if FILE_NAME.search(hint)}
+    assert named - {"Texture picture", "animate checkpoint"} == set(CALLS)  # an animation's checkpoint is refused
 
 
 @pytest.mark.parametrize("form", [str, Path, Named])
