@@ -25,7 +25,7 @@ from .small_work import work
 
 #: Execution settings by device type, which override those of the device.
 DEVICES: dict[str, dict[str, Any]] = {
-    "cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8"},
+    "cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8", "packs": True},
     "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh", "fuses": False},
 }
 #: Block sizes so small that even this work gives several work-items a block each.

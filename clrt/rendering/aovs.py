@@ -24,7 +24,7 @@ LIGHT = ("direct", "indirect")
 class Aovs:
     """AOVs of one render, by name in the requested order. Raises UsageError like `chosen_aovs` and `check_light`."""
 
-    def __init__(self, names: str | Iterable[str], integrator: str) -> None:
+    def __init__(self, names: str | Iterable[str] | None, integrator: str) -> None:
         self._names = chosen_aovs(names)
         check_light(self._names, integrator)
         self._first_hits = dict[str, NDArray[np.generic]]()
@@ -40,9 +40,11 @@ class Aovs:
         return {name: made[name] for name in self._names}
 
 
-def chosen_aovs(names: str | Iterable[str]) -> tuple[str, ...]:
+def chosen_aovs(names: str | Iterable[str] | None) -> tuple[str, ...]:
     """Return the names without duplicates; a string holds names separated by commas. Raises UsageError for names not in
     AOVS."""
+    if names is None:
+        return ()
     if not isinstance(names, Iterable):
         raise UsageError(f"aovs is {names!r}; give names, in a list or with commas between")
     given = names.split(",") if isinstance(names, str) else list(names)

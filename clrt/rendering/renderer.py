@@ -49,9 +49,10 @@ class Renderer:
         check_stops(options.get("spp"))
         percentile = checked_percentile(options.get("error_percentile"))
         self.scene = replace(scene, render=settings_of(scene.render, options))
-        self._aovs = Aovs(options.get("aovs") or (), self.settings.integrator)
+        self._aovs = Aovs(options.get("aovs"), self.settings.integrator)
         self.choices = choices_of(options)
-        on_phase, before = options.get("on_phase") or (lambda phase: None), options.get("before")
+        on_phase, before = options.get("on_phase"), options.get("before")
+        on_phase = on_phase if on_phase is not None else lambda phase: None
         self._open(options.get("device"), on_phase, before)
         self._checkpoints, kept = open_checkpoints(checkpoints_of(options), self.scene, self.choices, self.name)
         on_phase("compile")

@@ -91,7 +91,7 @@ def settings_of(settings: RenderSettings, options: Mapping[str, object]) -> Rend
 
 def choices_of(options: Mapping[str, object]) -> Choices:
     """Return the choices, including those that the requested AOVs imply. Raises UsageError for unknown values."""
-    aovs: Any = options.get("aovs") or ()
+    aovs: Any = options.get("aovs")
     names, chosen = chosen_aovs(aovs), _given(options, Choices)
     by_aovs = {"direct_light": needs_direct_light(names)} | ({"first_hits": True} if seen_first(names) else {})
     return Choices(**{**chosen, **by_aovs, "tests": HitTests(**_given(options, HitTests))})
