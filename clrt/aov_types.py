@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-#: Where its values come from. mean, center: the function seen_NAME of kernels/aov/first_hit.cl, averaged over a pixel's
+#: Source of its values. mean, center: the function seen_NAME of kernels/aov/first_hit.cl, averaged over a pixel's
 #: camera rays or for the ray through its center; hits: those, on the host (clrt/rendering/accumulation/first_hits.py);
 #: film: the film (clrt/rendering/aovs.py).
 Source = Literal["mean", "center", "hits", "film"]

@@ -52,3 +52,12 @@ def test_a_run_in_another_tree_ends_before_its_first_test(tmp_path: Path) -> Non
     assert done.returncode == pytest.ExitCode.USAGE_ERROR
     assert "clrt.kernels: core/lanes.cl" in done.stderr and "pip install" in done.stderr
     assert "passed" not in done.stdout
+
+
+def test_a_source_tree_uses_its_own_kernels(tmp_path: Path) -> None:
+    """Whatever clrt is installed."""
+    for folder in ("clrt", "kernels"):
+        shutil.copytree(HOUSE / folder, tmp_path / folder)
+    code = "from clrt.device.programs.kernel_files import kernel_folder; print(kernel_folder())"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert Path(done.stdout.strip()) == tmp_path / "kernels"

@@ -8,6 +8,7 @@ an emissive material; see also `Environment`.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from math import pi, radians, sin, sqrt
@@ -62,7 +63,7 @@ class DistantBounds(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BaseLight:
+class BaseLight(ABC):
     """Base class of lights. kernel: its type in scene files; distant: whether it is infinitely far away."""
 
     kernel: ClassVar[str]
@@ -81,13 +82,13 @@ class BaseLight:
         """The name of the kernel file that samples this light, one of `kernels`."""
         return self.kernel
 
+    @abstractmethod
     def parameters(self) -> dict[str, float | Vector]:
         """Return the values its kernel file reads: numbers and triples, the same names for all that it samples."""
-        raise NotImplementedError
 
+    @abstractmethod
     def bounds(self) -> Bounds | DistantBounds:
         """Return its bounds; DistantBounds if it is `distant`."""
-        raise NotImplementedError
 
     def features(self) -> frozenset[str]:
         """Return the macros to define, for parts of the kernels that only some lights need."""

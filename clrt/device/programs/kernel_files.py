@@ -10,11 +10,9 @@ from pathlib import Path
 
 
 def kernel_folder() -> Traversable:
-    """Return the installed package clrt.kernels, or the folder next to clrt in a source tree."""
-    try:
-        return files("clrt.kernels")
-    except ModuleNotFoundError:
-        return Path(__file__).parents[3] / "kernels"
+    """Return the folder next to clrt in a source tree, wherever clrt is installed; else the package clrt.kernels."""
+    beside = Path(__file__).parents[3] / "kernels"
+    return beside if (beside / "core" / "lanes.cl").is_file() else files("clrt.kernels")
 
 
 def kernel_digest() -> str:
