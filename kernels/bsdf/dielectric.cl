@@ -6,8 +6,8 @@
 // THIN_DIELECTRIC: a sheet with coincident faces. With all internal reflections summed,
 //   F + (1 − F)²·c²F/(1 − c²F²) is reflected, 2F/(1 + F) for c = 1, and (1 − F)²·c/(1 − c²F²) is transmitted unbent,
 // where c = color is the transmittance from face to face. A rough sheet spreads both alike (as glTF's transmission).
-// ATTENUATION: absorption inside by the Beer–Lambert law (integrator/path.cl). A sheet leaves the surrounding
-// absorption unchanged.
+// ATTENUATION: absorption inside by the Beer–Lambert law (integrator/path_segment.cl). A sheet leaves the
+// surrounding absorption unchanged.
 #include "bsdf/interface.cl"
 
 static inline real fresnel_of_cosines(real cos_o, real cos_t, real eta) {
