@@ -17,7 +17,7 @@ The public interface raises only these for users' mistakes; any other exception 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 
 class ClrtError(Exception):
@@ -87,4 +87,15 @@ def check_choice(name: str, value: object, known: Iterable[object]) -> None:
     values = tuple(known)
     if not isinstance(value, str | int | None) or value not in values:
         named = ", ".join(str(each) for each in values if each is not None)
-        raise UsageError(f"{name} {value!r} is unknown; choose from {named}")
+        raise UsageError(f"{name} {value!r} is unknown; choose from {named}{did_you_mean(value, values)}")
+
+
+def did_you_mean(name: object, known: Iterable[object], shown: Callable[[str], object] = str) -> str:
+    """Return the question that ends a message about an unknown name, or nothing if no known one is like it.
+
+    shown: how the name that is meant is to be written.
+    """
+    from difflib import get_close_matches  # only errors need it
+
+    near = get_close_matches(str(name), [each for each in known if isinstance(each, str)], 1)
+    return f"; did you mean {shown(*near)}?" if near else ""

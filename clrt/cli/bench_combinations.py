@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .bench_files import figures_options, write_figures
+from .option_types import OneOf
 
 if TYPE_CHECKING:
     from ..bench.combinations.combinations import Verdict
@@ -38,7 +39,7 @@ LEGEND = """  off: violations; rounds: suspicious scenes are rendered again with
     "--property",
     "names",
     multiple=True,
-    type=click.Choice(PROPERTIES),
+    type=OneOf(PROPERTIES),
     help="Test this property only; may be repeated. Default: all.",
 )
 @click.option("--scenes", type=click.IntRange(min=1), help="Number of random scenes; default: 500, with --quick 4.")

@@ -12,7 +12,7 @@ import click
 
 from ..errors import UsageError
 from .bench_files import figures_options, write_figures
-from .option_types import Size
+from .option_types import OneOf, Size
 
 if TYPE_CHECKING:
     from ..bench.convergence.converge import Effort
@@ -40,14 +40,14 @@ INTEGRATORS = ["path", "direct", "local", "raster"]
     "--choice",
     "names",
     multiple=True,
-    type=click.Choice(NAMES),
+    type=OneOf(NAMES),
     help="Configuration to compare with the first; may be repeated. Default: up to bvh2.",
 )
 @click.option(
     "--integrator",
     "integrators",
     multiple=True,
-    type=click.Choice(INTEGRATORS),
+    type=OneOf(INTEGRATORS),
     help="Integrator instead of the scene's; may be repeated. Each has its own reference.",
 )
 @click.option("--peers", is_flag=True, help="Also compare Mitsuba and Cycles, if installed.")

@@ -8,14 +8,14 @@ from typing import Any
 import click
 
 from .bench_files import figures_options, write_figures
-from .option_types import Size
+from .option_types import OneOf, Size
 
 TRIALS = ("equality", "animation", "kills", "overhead", "huge")
 SCENES = Path(__file__).parents[2] / "scenes"
 
 
 @click.command("farm")
-@click.argument("trials", nargs=-1, type=click.Choice(TRIALS))
+@click.argument("trials", nargs=-1, type=OneOf(TRIALS))
 @click.option(
     "--scene",
     "scenes",

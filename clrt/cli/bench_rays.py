@@ -10,6 +10,7 @@ import click
 
 from ..accel.methods import BuilderName, LayoutName
 from .bench_files import figures_options, write_figures
+from .option_types import OneOf
 from .options import hit_options
 
 
@@ -24,11 +25,11 @@ from .options import hit_options
 @click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @click.option(
     "--layout",
-    type=click.Choice(get_args(LayoutName)),
+    type=OneOf(get_args(LayoutName)),
     help="BVH layout; default: all of them or, with --rays, the device's default.",
 )
 @hit_options
-@click.option("--builder", type=click.Choice(get_args(BuilderName)), help="BVH builder.")
+@click.option("--builder", type=OneOf(get_args(BuilderName)), help="BVH builder.")
 @click.option("--quick", is_flag=True, help="Use fewer rays and a smaller sphere.")
 @figures_options
 def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: Path | None, **options: Any) -> None:

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import click
 
 from ..scene.validation.limits import Ge, Le, Limit, Lt
-from .option_types import Finite, Size
+from .option_types import Finite, OneOf, Size
 
 Decorator = Callable[[Any], Any]
 
@@ -69,12 +69,12 @@ def _option(each: Field[Any], hint: Any, name: str | None, defaults: bool) -> De
         return click.option(
             name,
             each.name,
-            type=click.Choice(["on", "off"]),
+            type=OneOf(["on", "off"]),
             **told,
             callback=lambda context, parameter, value: value and value == "on",
         )
     default = each.default if defaults else None
-    value = click.Choice(values) if values else _type(kind)
+    value = OneOf(values) if values else _type(kind)
     return click.option(
         name,
         each.name,
@@ -95,7 +95,7 @@ def _type(hint: Any) -> click.ParamType[Any]:
     """Return the option type for a field's type, with its limits."""
     origin, parts = get_origin(hint), get_args(hint)
     if origin is Literal:
-        return click.Choice(parts)
+        return OneOf(parts)
     if origin is tuple:
         return Size()
     limits: dict[type[Limit], Any] = {type(each): each.bound for each in parts[1:]} if origin is Annotated else {}

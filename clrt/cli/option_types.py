@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from ..errors import did_you_mean
+
 
 class Size(click.ParamType[tuple[int, int]]):
     """WIDTHxHEIGHT in pixels, e.g. 1920x1080."""
@@ -31,6 +33,18 @@ class Pixel(click.ParamType[tuple[int, int]]):
         if not match:
             self.fail(f"{value!r} is not a pixel; write X,Y, its column and row from 0, e.g. 120,64", param, context)
         return int(match[1]), int(match[2])
+
+
+class OneOf(click.Choice[Any]):
+    """One of several words, which the error for a misspelled one suggests."""
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> str:
+        try:
+            return super().convert(value, param, context)
+        except click.BadParameter as error:
+            if meant := did_you_mean(value, self.choices):
+                error.message = error.message.removesuffix(".") + meant
+            raise
 
 
 class Finite(click.FloatRange):

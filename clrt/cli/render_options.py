@@ -10,6 +10,7 @@ import click
 from ..errors import UsageError
 from ..rendering.checkpoint.policy import CheckpointPolicy
 from .option_groups import flag
+from .option_types import OneOf
 
 FILE = click.Path(path_type=Path)
 
@@ -114,7 +115,7 @@ class DisplayOptions:
 
     progress_kind: str | None = flag(
         "--progress",
-        type=click.Choice(["bar", "plain", "json"]),
+        type=OneOf(["bar", "plain", "json"]),
         help="Format of the progress display on standard error; default: bar on a terminal, else plain.",
     )
     print_kernel: bool = flag(

@@ -10,26 +10,19 @@ from typing import Any
 import click
 
 from ..errors import UsageError
+from ..scene.render_settings import RenderSettings
 from . import PROGRAM
 from .guard import guarded
 from .interrupt import Interruptible
 from .logs import verbose_option
-from .option_types import Size
-from .options import CAMERA
+from .option_groups import settings_options
+from .options import CAMERA, NAMES
 
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("--camera", metavar="NAME", help=CAMERA)
-@click.option("--size", type=Size(), help="Image size in pixels.")
-@click.option("--spp", type=click.IntRange(min=1), help="Stop refining at this many samples per pixel.")
-@click.option(
-    "--depth",
-    "max_depth",
-    type=click.IntRange(1, 1024),
-    help="Maximum path depth: 1 emission only, 2 direct light, 3 one bounce.",
-)
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random number generator.")
+@settings_options(RenderSettings, NAMES, defaults=False)
 @click.option(
     "--device",
     "devices",
@@ -37,7 +30,6 @@ from .options import CAMERA
     metavar="SEL",
     help="Device to use; see `clrt devices`. Repeat to use several.",
 )
-@click.option("--integrator", help="Integrator; default: the scene's.")
 @click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform; see `clrt render`.")
 @click.option("--exposure", default=0.0, metavar="EV", help="In stops.")
 @verbose_option
@@ -55,7 +47,6 @@ def command(
     from ..formats.load_scene import load
     from ..live.settings import Settings
     from ..output.view_transform import check_view
-    from ..scene.model import RenderSettings
     from ..scene.validation.field_types import field_problems
     from ..window.app import App, DisplaySettings
 

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import OutputError
+from ..errors import OutputError, did_you_mean
 from ..file_names import StrPath, utf8_path
 from ..formats.images.image_reader import read_picture
 from .aov_files import Pictures, drawn, files_beside, layered
@@ -53,9 +52,7 @@ def check_writable(path: Path) -> None:
     check_target(path)
     extension = path.suffix.lower()
     if extension not in EXTENSIONS:
-        meant = "".join(
-            f"; did you mean {path.with_suffix(match)}?" for match in get_close_matches(extension, EXTENSIONS, 1)
-        )
+        meant = did_you_mean(extension, EXTENSIONS, path.with_suffix)
         problem = f"unknown image format {extension}" if extension else "the name has no extension"
         raise OutputError(f"{path}: {problem}; use {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}{meant}")
 

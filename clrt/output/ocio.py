@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UsageError
+from ..errors import UsageError, did_you_mean
 
 FloatArray = NDArray[np.float32]
 
@@ -78,7 +77,7 @@ def _display_view(config: str, colors: Any, name: str) -> tuple[str, str]:
     }
     if name in all_views:
         return all_views[name]
-    meant = "".join(f"; did you mean ocio:{match}?" for match in get_close_matches(name, [*views, *all_views], 1))
+    meant = did_you_mean(name, [*views, *all_views], "ocio:{}".format)
     raise UsageError(
         f"{config}: view {name!r} is unknown; {display} has {', '.join(views)}, others are named "
         f"DISPLAY/VIEW for {', '.join(colors.getDisplayNames())}{meant}"

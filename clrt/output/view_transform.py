@@ -7,13 +7,12 @@ To add one: write its function and list it in VIEWS.
 from __future__ import annotations
 
 from collections.abc import Callable
-from difflib import get_close_matches
 from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UsageError
+from ..errors import UsageError, did_you_mean
 from .ocio import ACES, ocio_view
 
 FloatArray = NDArray[np.float32]
@@ -111,7 +110,7 @@ def view_called(name: str) -> View:
         return ocio_view(*ACES)
     if kind == "ocio":
         return ocio_view("", view)
-    meant = "".join(f"; did you mean {match}?" for match in get_close_matches(name, [*VIEWS, "aces"], 1))
+    meant = did_you_mean(name, [*VIEWS, "aces"])
     raise UsageError(f"view transform {name!r} is unknown; choose from {', '.join(VIEWS)}, aces and ocio:VIEW{meant}")
 
 

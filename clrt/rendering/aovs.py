@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..aov_types import AOV_TYPES, aovs_from
-from ..errors import UsageError
+from ..errors import UsageError, did_you_mean
 from ..float_errors import with_default_errors
 from ..scene.model import Scene
 from .accumulation.accumulation import Accumulation
@@ -53,8 +52,7 @@ def chosen_aovs(names: str | Iterable[str] | None) -> tuple[str, ...]:
     chosen = tuple(dict.fromkeys(name.strip() for name in given))
     for name in chosen:
         if name not in AOVS:
-            meant = "".join(f"; did you mean {match}?" for match in get_close_matches(name, AOVS, 1))
-            raise UsageError(f"AOV {name!r} is unknown; choose from {', '.join(AOVS)}{meant}")
+            raise UsageError(f"AOV {name!r} is unknown; choose from {', '.join(AOVS)}{did_you_mean(name, AOVS)}")
     return chosen
 
 

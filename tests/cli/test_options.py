@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import click
@@ -41,6 +41,30 @@ def test_options_offer_what_there_is(command: click.Command, names: Iterable[str
     for name in names:
         offered = options[name]
         assert isinstance(offered, click.Choice) and set(offered.choices) == set(KNOWN[name])
+
+
+def leaves(group: click.Group) -> Iterator[click.Command]:
+    """Yield all commands of a group and of the groups in it."""
+    for name in group.list_commands(click.Context(group)):
+        each = group.get_command(click.Context(group), name)
+        assert each
+        if isinstance(each, click.Group):
+            yield from leaves(each)
+        else:
+            yield each
+
+
+def test_misspelled_values_are_corrected() -> None:
+    """The error for a word with a letter too many suggests the word, in every option of every command."""
+    words = 0
+    for command in leaves(commands):
+        for option in command.params:
+            if isinstance(option.type, click.Choice) and isinstance(option.type.choices[0], str):
+                word = max(option.type.choices, key=len)
+                with pytest.raises(click.BadParameter, match=f"; did you mean {word}\\?$"):
+                    option.type.convert(f"{word}x", option, click.Context(command))
+                words += 1
+    assert words > 40
 
 
 def test_what_is_chosen_is_compiled(tmp_path: Path) -> None:
