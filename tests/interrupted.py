@@ -26,11 +26,12 @@ def run(call: Callable[[], object], files: tuple[str, ...], last: int = -1) -> i
             raise Interrupted
         return trace
 
+    before = sys.gettrace()
     sys.settrace(trace)
     try:
         call()
     except Interrupted:
         pass
     finally:
-        sys.settrace(None)
+        sys.settrace(before)
     return count

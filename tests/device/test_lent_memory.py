@@ -20,8 +20,16 @@ import pyopencl as cl
 import pytest
 
 import clrt
+from clrt.accel.build import build_tree
 from clrt.device.launches import device_arrays, lent_memory as lending
+from clrt.device.launches.data_parallel import DataParallel
 from clrt.device.open import Device
+from clrt.farm.orders import Order
+from clrt.farm.share_renderer import ShareRenderer
+from clrt.live.live_renderer import ImageRequest, LiveRenderer
+from clrt.live.settings import Settings
+from clrt.rendering.compile.choices import Choices
+from clrt.scene.render_settings import Integrator
 
 pytestmark = pytest.mark.processes
 
@@ -33,14 +41,15 @@ LINES = 160
 
 
 class Gate:
-    """Blocks commands that are enqueued while it is closed, until it is opened."""
+    """Blocks commands that are enqueued while it is closed, until it is opened. Calls that would wait for them are
+    interrupted instead."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.launched = self.closed = False
         self.lent: list[weakref.ref[Any]] = []
         self.at_launch: list[weakref.ref[Any]] = []
         self._bars: list[cl.UserEvent] = []
-        enqueue, lend = cl.enqueue_nd_range_kernel, lending.lend
+        enqueue, lend, copy, finish = cl.enqueue_nd_range_kernel, lending.lend, cl.enqueue_copy, DataParallel.finish
 
         def launch(queue: cl.CommandQueue, *arguments: Any) -> cl.Event:
             if self.closed:
@@ -49,11 +58,18 @@ class Gate:
                 self.launched, self.at_launch = True, [each for each in self.lent if each() is not None]
             return enqueue(queue, *arguments)
 
+        def unless_blocked(call: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+            if self._bars:
+                raise KeyboardInterrupt
+            return call(*arguments, **named)
+
         def noted(device: Device, array: Any, access: int) -> lending.LentBuffer:
             self.lent.append(weakref.ref(array))
             return lend(device, array, access)
 
         monkeypatch.setattr(cl, "enqueue_nd_range_kernel", launch)
+        monkeypatch.setattr(cl, "enqueue_copy", partial(unless_blocked, copy))
+        monkeypatch.setattr(DataParallel, "finish", lambda work: unless_blocked(finish, work))
         monkeypatch.setattr(device_arrays, "lend", noted)
         monkeypatch.setattr("clrt.device.launches.launch.LONGEST_LOOK", 1e-3)
 
@@ -88,15 +104,34 @@ def query(device: Device) -> clrt.RayQuery:
     return clrt.RayQuery(*MESH, device=device.info.index)
 
 
-def renderer(device: Device, count: int = 1) -> clrt.Renderer:
-    spheres = [clrt.Sphere(center=(x, 0.0, 0.0), radius=0.4) for x in range(-4, 5)]
-    scene = clrt.Scene(meshes=[clrt.Mesh(*MESH)], spheres=spheres, environment=clrt.Environment(color=(1.0, 1.0, 1.0)))
-    return clrt.Renderer(scene, size=(40, 24), spp=8, device=[device.info.index] * count)
+def scene() -> clrt.Scene:
+    return clrt.Scene(
+        meshes=[clrt.Mesh(*MESH)],
+        spheres=[clrt.Sphere(center=(x, 0.0, 0.0), radius=0.4) for x in range(-4, 5)],
+        environment=clrt.Environment(color=(1.0, 1.0, 1.0)),
+        lights=[clrt.PointLight(position=(0.0, 3.0, 0.0), intensity=(9.0, 9.0, 9.0))],
+        render=clrt.RenderSettings(size=(40, 24), spp=8),
+    )
+
+
+def renderer(device: Device, count: int = 1, integrator: Integrator = "path") -> clrt.Renderer:
+    return clrt.Renderer(scene(), integrator=integrator, device=[device.info.index] * count)
 
 
 def first_hits(device: Device) -> Callable[[], object]:
     made = renderer(device)
     return partial(made.session.first_hits, made.scene, ["depth"])
+
+
+def live(device: Device) -> Callable[[], object]:
+    asked = ImageRequest(1, scene(), Settings(device=device.info.index), False)
+    return lambda: list(LiveRenderer(lambda phase: None).states(asked, asked.size, 8))
+
+
+def share(device: Device) -> Callable[[], object]:
+    """Return a farm worker's part in an image."""
+    made = ShareRenderer(Order(scene(), Choices(), 8, (device.info.index,)))
+    return partial(made.share, np.arange(4, dtype=np.uint32), 0, 8, None)
 
 
 #: Functions that prepare a call that runs launches.
@@ -106,18 +141,30 @@ USES: dict[str, Callable[[Device], Callable[[], object]]] = {
     "all_hits": lambda device: partial(query(device).all_hits, *RAYS),
     "renderer": lambda device: partial(list, renderer(device).passes()),
     "two devices": lambda device: partial(list, renderer(device, 2).passes()),
+    "raster": lambda device: partial(list, renderer(device, integrator="raster").passes()),
     "first hits": first_hits,
+    "build": lambda device: partial(build_tree, device, device.layout, "reinsertion", MESH[0][MESH[1]]),
+    "window": live,
+    "farm worker": share,
 }
 
 
+def returning(frame: FrameType | None) -> bool:
+    """Return whether the frame belongs to the callback for a lent buffer that is gone."""
+    while frame and frame.f_code is not lending._begin_return.__code__:
+        frame = frame.f_back
+    return frame is not None
+
+
 def interrupted(use: Callable[[], object], gate: Gate, line: int) -> None:
-    """Run `use` and raise KeyboardInterrupt `line` lines of clrt after the first launch."""
+    """Run `use` and raise KeyboardInterrupt `line` lines of clrt after the first launch; not in callbacks of weak
+    references, where Python ignores exceptions: what they leave is done at the next launch."""
     passed = 0
 
     def trace(frame: FrameType, event: str, _: object) -> Any:
         nonlocal passed
         passed += gate.launched and event == "line"
-        if passed > line:
+        if passed > line and not returning(frame):
             passed = -(10**9)
             raise KeyboardInterrupt
         return trace if "/clrt/" in frame.f_code.co_filename else None

@@ -16,7 +16,7 @@ import pytest
         ("", [], {"DISPLAY": ""}, 6, "neither DISPLAY nor WAYLAND_DISPLAY is set"),
         ("", [], {"DISPLAY": ":4711"}, 6, "no window can be opened"),
         ("sys.modules['imgui_bundle'] = None; ", [], {}, 2, "pip install imgui-bundle PyOpenGL"),
-        ("", ["--integrator", "pth"], {}, 2, 'did you mean path?'),
+        ("", ["--integrator", "pth"], {}, 2, "did you mean path?"),
         ("", ["--view", "agy"], {}, 2, "did you mean agx?"),
         ("", ["--device", "abacus"], {}, 4, "no usable device matches"),
     ],
