@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import UsageError
 from .float_errors import with_default_errors
 from .queries.mesh import RayQuery
+from .scene.fields.number_arrays import real_array
 from .scene.geometry.ray_arrays import ray_arrays
-from .scene.validation.number_arrays import real_array
 
 __all__ = ["RayMeshIntersector"]
 

@@ -13,7 +13,7 @@ import clrt
 from clrt.accel.build import build_tree
 from clrt.accel.device_builder import SHAPES
 from clrt.accel.traversal_kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, UPPER_LEVELS, HitTests
-from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.kernel_probe import choices
 from clrt.debug.trace import trace_pixel
 from clrt.device.open import Device
 from clrt.output.aov_files import layered

@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 HOUSE = Path(__file__).parents[1]
@@ -84,6 +85,32 @@ def test_rooms_are_entered_in_order_and_only_some_know_opencl() -> None:
         for module in imported(path)
         if not may_import(room(name(path)), module)
     ]
+
+
+def circle(imports: Iterable[tuple[str, str]]) -> list[str]:
+    """Return folders that import each other in a circle, empty if none do."""
+    graph: dict[str, set[str]] = {}
+    for importing, module in imports:
+        graph.setdefault(importing, set()).add(module)
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_folders_import_in_one_direction() -> None:
+    """Also for types alone, and within functions; a folder and those in it may import each other."""
+    modules = {name(path): path for path in SOURCES}
+
+    def folder(module: str) -> str:
+        return module if modules[module].name == "__init__.py" else module.rpartition(".")[0]
+
+    pairs = [(own, module) for own, path in modules.items() for module in imported(path) if module in modules]
+    folders = {(folder(own), folder(module)) for own, module in pairs}
+    apart = [pair for pair in folders if not any(f"{a}.".startswith(f"{b}.") for a, b in (pair, pair[::-1]))]
+    assert not circle(apart)
+    assert circle([*apart, ("clrt.device", "clrt.rendering")])
 
 
 def test_imports_that_are_wrong_are_found() -> None:

@@ -16,7 +16,7 @@ from .this_tree import HOUSE, differing, other_file
 CHANGES: dict[str, Callable[[Path], object]] = {
     "scene/model.py": lambda file: file.write_text("# another\n"),
     "scene/new.py": lambda file: file.write_text(""),
-    "device/programs/cache_files.py": lambda file: file.unlink(),
+    "device/cache_files.py": lambda file: file.unlink(),
     "device": lambda folder: shutil.rmtree(folder),
 }
 

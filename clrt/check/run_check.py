@@ -11,7 +11,7 @@ from queue import Empty, SimpleQueue
 from typing import IO, Any
 
 from ..awake import AwakeClock
-from ..device.discovery.device_info import DeviceInfo, Verdict
+from ..device.device_info import DeviceInfo, Verdict
 from ..device.programs.child_process import end_child, last_line, start_child, told_end
 from ..device.programs.kernel_files import kernel_digest
 from ..errors import DeviceError

@@ -86,7 +86,7 @@ def _run(arguments: list[str] | None) -> str | int | None:
 
 def _keep(error: str) -> None:
     """Store the error for `clrt doctor`."""
-    from ..device.programs.cache_files import keep_log
+    from ..device.cache_files import keep_log
 
     keep_log("error", error)
 

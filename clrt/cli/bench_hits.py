@@ -21,7 +21,7 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
     A million rays per mesh: random ones, and rays aimed at vertices, at edges and along the axes. Then counts the hits
     that are wrong according to float64.
     """
-    from ..bench.rays.hit_agreement import measure_hits
+    from ..bench.numerics.hit_agreement import measure_hits
     from ..device.discovery.discover import choose, devices
 
     only = None if device is None else choose(device)[0].index

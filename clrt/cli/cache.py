@@ -12,7 +12,7 @@ def command(clear: bool) -> None:
 
     All of it is recreated when needed. Drivers have program caches of their own.
     """
-    from ..device.programs import cache_files
+    from ..device import cache_files
 
     sizes = cache_files.sizes()
     click.echo(cache_files.cache_folder())

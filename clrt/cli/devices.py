@@ -13,7 +13,7 @@ from .logs import verbose_option
 from .option_types import Finite
 
 if TYPE_CHECKING:
-    from ..device.discovery.device_info import DeviceInfo, Verdict
+    from ..device.device_info import DeviceInfo, Verdict
 
 
 @click.command()

@@ -90,7 +90,7 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
         return os.WEXITSTATUS(status)
     name = signal.Signals(os.WTERMSIG(status)).name
     if name in CRASHES:
-        from ..device.discovery.driver_caches import no_room
+        from ..device.driver_caches import no_room
         from ..device.pocl.kernel_cache import kept_programs, remove_damaged
 
         damaged = remove_damaged()

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import click
 
-from ..scene.validation.limits import Ge, Le, Limit, Lt
+from ..scene.fields.limits import Ge, Le, Limit, Lt
 from .option_types import Finite, OneOf, Size
 
 Decorator = Callable[[Any], Any]

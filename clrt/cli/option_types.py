@@ -38,13 +38,10 @@ class Pixel(click.ParamType[tuple[int, int]]):
 class OneOf(click.Choice[Any]):
     """One of several words, which the error for a misspelled one suggests."""
 
-    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> str:
-        try:
-            return super().convert(value, param, context)
-        except click.BadParameter as error:
-            if meant := did_you_mean(value, self.choices):
-                error.message = error.message.removesuffix(".") + meant
-            raise
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        message = super().get_invalid_choice_message(value, ctx)
+        meant = did_you_mean(value, self.choices)
+        return message.removesuffix(".") + meant if meant else message
 
 
 class Finite(click.FloatRange):

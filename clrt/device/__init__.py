@@ -1,3 +1,3 @@
 """OpenCL devices, programs and bounded launches. Only this package, accel and render import pyopencl."""
 
-from .discovery import driver_caches as environment  # must come before the first import of pyopencl
+from . import driver_caches as environment  # must come before the first import of pyopencl

@@ -11,7 +11,7 @@ from pyopencl import CommandQueue, Context
 
 from ..errors import DeviceError, UsageError
 from .contexts import SharedContext, shared_by
-from .discovery.device_info import DeviceInfo
+from .device_info import DeviceInfo
 from .discovery.discover import choose
 from .launches.fork_safety import check_process
 from .launches.hang_watchdog import take_any_time

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from ..device.launches.malloc_trim import keep_less
+from ..device.malloc_trim import keep_less
 from ..errors import DeviceError, UsageError
 from .scheduler import check_scheduler
 from .worker_tasks import as_it_is

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.launches.memory_plan import check_host
+from ..device.memory_plan import check_host
 from ..device.open import Device
 from ..errors import ClrtError
 from ..rendering.accumulation.accumulation import Accumulation

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.launches.malloc_trim import give_back
+from ..device.malloc_trim import give_back
 from ..device.open import Device, open_devices
 from ..output.denoise import Denoiser
 from ..rendering.accumulation.denoiser_guides import render_guides

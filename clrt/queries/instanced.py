@@ -14,10 +14,10 @@ from ..accel.two_level import TwoLevelBvh
 from ..device.open import open_device
 from ..errors import SceneError
 from ..float_errors import with_default_errors
+from ..scene.fields.number_arrays import real_array, whole_array
 from ..scene.geometry.mesh_arrays import mesh_arrays
 from ..scene.geometry.scaling import SceneFrame, frame_around, unit_for
 from ..scene.geometry.transform import transform_faults
-from ..scene.validation.number_arrays import real_array, whole_array
 from .base import TreeQuery
 
 Doubles = NDArray[np.float64]

@@ -37,7 +37,7 @@ class Progress:
 
     def restore(self, kept: SavedState) -> None:
         """Resume from a saved state."""
-        self.convergence.restore(kept)
+        self.convergence.restore(kept.noise, kept.history)
         self.session.restore(kept.film, kept.work)
         self.seconds = kept.seconds
         self.state(None)

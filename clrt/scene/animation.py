@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from .fields.limits import Gt, Lt
+from .fields.tuples import tuples_for_lists
 from .materials.textures import NonNegative
-from .validation.limits import Gt, Lt
-from .validation.tuples import tuples_for_lists
 
 Vector = tuple[float, float, float]
 Positive = Annotated[float, Gt(0)]

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .animation import Positive, Vector
+from .fields.limits import Gt, Lt
+from .fields.tuples import tuples_for_lists
 from .materials.textures import NonNegative
-from .validation.limits import Gt, Lt
-from .validation.tuples import tuples_for_lists
 
 Doubles = NDArray[np.float64]
 Projection = Literal["perspective", "orthographic", "equirectangular"]

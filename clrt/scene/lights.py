@@ -16,9 +16,9 @@ from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args
 
 import numpy as np
 
+from .fields.limits import Ge, Gt, Le, Lt
+from .fields.tuples import tuples_for_lists
 from .materials.material import Radiance
-from .validation.limits import Ge, Gt, Le, Lt
-from .validation.tuples import tuples_for_lists
 
 Length = Annotated[float, Gt(0)]
 Vector = tuple[float, float, float]

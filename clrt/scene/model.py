@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from ..errors import ClrtError
 from .animation import Animation
 from .cameras import Camera as Camera
+from .fields.limits import Gt
+from .fields.number_arrays import real_array, whole_array
+from .fields.tuples import tuples_for_lists
 from .lights import Light
 from .materials.material_types import Diffuse, Material
 from .materials.textures import NonNegative
 from .render_settings import RenderSettings as RenderSettings
-from .validation.limits import Gt
-from .validation.number_arrays import real_array, whole_array
-from .validation.tuples import tuples_for_lists
 
 Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]

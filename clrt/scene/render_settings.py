@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from ..option_fields import option
-from .validation.limits import Ge, Le, Lt
-from .validation.tuples import tuples_for_lists
+from .fields.limits import Ge, Le, Lt
+from .fields.tuples import tuples_for_lists
 
 Pixels = Annotated[int, Ge(1), Le(65536)]
 Integrator = Literal["path", "direct", "local", "raster", "normals", "albedo", "depth"]

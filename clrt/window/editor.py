@@ -12,7 +12,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from ..device.discovery.device_info import DeviceInfo
+from ..device.device_info import DeviceInfo
 from ..errors import ClrtError, UsageError
 from ..formats.load_scene import load
 from ..live.live import Live

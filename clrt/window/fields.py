@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args
 import numpy as np
 from imgui_bundle import imgui
 
+from ..scene.fields.limits import Ge, Gt, Le, Lt
 from ..scene.materials.textures import Texture
-from ..scene.validation.limits import Ge, Gt, Le, Lt
 
 Value = TypeVar("Value")
 

@@ -1,4 +1,4 @@
-// Kernels that apply one function each to arrays, LANES elements per work-item (clrt/bench/numerics/kernel_probe.py).
+// Kernels that apply one function each to arrays, LANES elements per work-item (clrt/bench/kernel_probe.py).
 //
 // Compiled into a scene's program in place of integrator/path.cl, so the probed code is that which renders the scene.
 // Arrays are rows of n floats: row r of element i is array[r·n + i]. Integers up to 2^24 and masks (0, 1) are stored

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from clrt.bench.numerics.bsdf_cases import COSINES, plain_variants, view, views, worded_variants
+from clrt.scene.fields.limits import Ge, Le
 from clrt.scene.materials.material_types import Albedo, Diffuse, Material, MetallicRoughness
-from clrt.scene.validation.limits import Ge, Le
 
 
 @dataclass(frozen=True, kw_only=True)

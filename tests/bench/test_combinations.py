@@ -17,7 +17,7 @@ from clrt.bench.combinations.combinations import ROUNDS, keep_scenes, verdict, v
 from clrt.bench.combinations.identities import PROPERTIES, Side, single_lights, strategies
 from clrt.bench.combinations.random_draws import Draws
 from clrt.bench.combinations.random_scenes import BATCH, random_scene
-from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.kernel_probe import choices
 from clrt.device.open import Device
 from clrt.rendering.accumulation.launch_plan import LaunchPlan
 from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation

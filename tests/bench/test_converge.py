@@ -20,8 +20,8 @@ from clrt.bench.convergence.contestants import CHOICES, MORE_CHOICES, Picture, c
 from clrt.bench.convergence.converge import Effort, Point, figures, measure_convergence, take_turns
 from clrt.bench.convergence.reference import FIRST_SEED, STEP_SPP, Reference, render_reference
 from clrt.cli.bench_converge import NAMES, converge_command
+from clrt.device.cache_files import REFERENCES
 from clrt.device.open import Device
-from clrt.device.programs.cache_files import REFERENCES
 from clrt.formats.load_scene import load
 from clrt.output.images import read_image
 from clrt.rendering.renderer import Renderer

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from clrt.device.device_info import DeviceInfo
 from clrt.device.discovery import discover
-from clrt.device.discovery.device_info import DeviceInfo
 from clrt.device.discovery.discover import choose, devices, find_devices
 from clrt.device.open import Device, open_device
 from clrt.device.pocl import cpu_name

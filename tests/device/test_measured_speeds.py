@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from clrt.device.device_info import DeviceInfo, Speed
 from clrt.device.discovery import measured_speeds
-from clrt.device.discovery.device_info import DeviceInfo, Speed
 from clrt.device.discovery.discover import find_devices
 from clrt.device.discovery.measured_speeds import keep_speed, kept_speed
 

@@ -23,9 +23,9 @@ from clrt.accel.traversal_kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS
 from clrt.bench.numerics.bsdf_cases import variants
 from clrt.check import kernel_calls
 from clrt.debug.record import vertex_preamble
+from clrt.device import cache_files
 from clrt.device.launches.driver_loop_limits import turns_source
 from clrt.device.open import Device
-from clrt.device.programs import cache_files
 from clrt.device.programs.program import BuiltProgram, build, compose, files_of, make_kernel
 from clrt.errors import KernelError
 from clrt.rendering.accumulation.first_hits import first_hit_program

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.needs("gcc")
 MEASURED = """
 import clrt, json, sys
 from clrt.device.discovery.discover import find_devices
-from clrt.device.discovery.device_info import Speed
+from clrt.device.device_info import Speed
 from clrt.device.discovery.measured_speeds import keep_speed
 speeds = json.loads(sys.argv[1])
 for info, _ in find_devices():

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clrt.device.discovery import driver_caches
-from clrt.device.discovery.driver_caches import ROOM
-from clrt.device.programs import background_compile, cache_files as cache
+from clrt.device import cache_files as cache, driver_caches
+from clrt.device.driver_caches import ROOM
+from clrt.device.programs import background_compile
 from clrt.errors import KernelError
 from clrt.output.images import read_image
 
@@ -116,7 +116,7 @@ def test_memory_is_taken_where_the_temporary_folder_is_full(tmp_path: Path, monk
 
 
 def test_the_cause_is_not_named_where_there_is_room(tmp_path: Path) -> None:
-    code = "from clrt.device.discovery.driver_caches import no_room; print(repr(no_room()))"
+    code = "from clrt.device.driver_caches import no_room; print(repr(no_room()))"
     done = subprocess.run(
         [sys.executable, "-c", code],
         env=surroundings(TMPDIR=str(tmp_path), HOME="/nonexistent"),
@@ -130,7 +130,7 @@ def test_the_cause_is_not_named_where_there_is_room(tmp_path: Path) -> None:
 @pytest.mark.parametrize("missing", [0, 1])
 def test_a_folder_without_room_is_not_taken(tmp_path: Path, missing: int) -> None:
     """As on a full disk, or beyond a quota."""
-    code = f"from clrt.device.discovery.driver_caches import _writable; print(_writable({str(tmp_path)!r}))"
+    code = f"from clrt.device.driver_caches import _writable; print(_writable({str(tmp_path)!r}))"
     places = surroundings(TMPDIR=str(tmp_path), HOME=str(tmp_path))
     most = ROOM - missing
     done = subprocess.run(

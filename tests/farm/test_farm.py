@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import clrt
+from clrt.device.device_info import Verdict
 from clrt.device.discovery.check_results import keep_verdict
-from clrt.device.discovery.device_info import Verdict
 from clrt.device.open import Device
 from clrt.device.programs.kernel_files import kernel_digest
 from clrt.errors import DeviceError

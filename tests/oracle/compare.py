@@ -13,7 +13,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.kernel_probe import choices
 from clrt.bench.renderers.agreement import block_means
 from clrt.bench.significance import FAMILY, corrected, t_test
 from clrt.device.open import Device

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.kernel_probe import choices
 from clrt.device.open import Device
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.materials.material import Material

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.kernel_probe import choices
 from clrt.bench.significance import mean_test
 from clrt.device.open import Device
 from clrt.rendering.accumulation.launch_plan import LaunchPlan

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
-from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.kernel_probe import choices
 from clrt.bench.significance import sidak
 from clrt.debug.record import PathEnd
 from clrt.debug.trace import trace_pixel

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clrt.bench.kernel_probe import Doubles
 from clrt.bench.numerics.bsdf_cases import bsdfs, uniform
-from clrt.bench.numerics.kernel_probe import Doubles
 from clrt.bench.numerics.scattering import FITTED, FLIP, above
 from clrt.bench.significance import chi2_test, mean_test, rejected
 from clrt.device.open import Device

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.bench.kernel_probe import Doubles
 from clrt.bench.numerics.bsdf_cases import bsdfs
-from clrt.bench.numerics.kernel_probe import Doubles
 from clrt.device.open import Device
 from clrt.scene.materials.material_types import Dielectric, Diffuse
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
 from clrt.rendering.film.film import Film

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from clrt.bench.kernel_probe import Probe
 from clrt.bench.numerics.film_sums import accumulate, stream_errors
-from clrt.bench.numerics.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.rendering.film.film import RELATIVE_FLOOR, Film
 from clrt.scene.materials.material_types import Diffuse

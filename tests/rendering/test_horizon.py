@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from clrt.bench.kernel_probe import Doubles, Probe
 from clrt.bench.numerics.bsdf_cases import uniform
-from clrt.bench.numerics.kernel_probe import Doubles, Probe
 from clrt.bench.numerics.scattering import FITTED
 from clrt.bench.rays.shapes import icosphere
 from clrt.bench.significance import chi2_test, mean_test, rejected

@@ -28,13 +28,13 @@ from clrt.rendering.checkpoint.identity import (
     ENDS,
     NAMES,
     ROUNDING,
-    UNSEEN,
     code_digest,
     differences,
     facts_of,
     scene_hash,
 )
 from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.visible_parts import UNSEEN
 from clrt.rendering.render_report import render_report
 from clrt.rendering.renderer_options import choices_of, settings_of
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.kernel_probe import Probe
 from clrt.bench.numerics.cases.instances import lit_plane, transforms_of_kinds
 from clrt.bench.numerics.cases.subject import Subject
-from clrt.bench.numerics.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.rendering.compile.geometry import pack_instances
 from clrt.scene.geometry import instancing

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.kernel_probe import choices
 from clrt.bench.numerics.cases.instances import transforms_of_kinds
-from clrt.bench.numerics.kernel_probe import choices
 from clrt.bench.significance import mean_test
 from clrt.device.open import Device
 from clrt.rendering.accumulation.denoiser_guides import render_guides

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clrt.bench.kernel_probe import Doubles
 from clrt.bench.numerics.bsdf_cases import bsdfs
 from clrt.bench.numerics.furnace import SMITHS, evenly
-from clrt.bench.numerics.kernel_probe import Doubles
 from clrt.bench.numerics.scattering import ROUNDING, reciprocity
 from clrt.device.open import Device
 from clrt.scene.materials.material_types import MetallicRoughness

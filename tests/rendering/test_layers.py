@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clrt.bench.kernel_probe import Doubles
 from clrt.bench.numerics.bsdf_cases import Bsdfs, bsdfs, uniform
-from clrt.bench.numerics.kernel_probe import Doubles
 from clrt.bench.numerics.scattering import FLIP, above
 from clrt.device.open import Device
 from clrt.rendering.compile.choices import Choices

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.kernel_probe import Probe, choices
 from clrt.bench.numerics.cases.subject import unit_vectors
-from clrt.bench.numerics.kernel_probe import Probe, choices
 from clrt.bench.significance import chi2_test, sidak
 from clrt.device.open import Device
 from clrt.rendering.compile.compile_scene import compile_scene

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from clrt.bench.combinations.random_draws import Draws
-from clrt.bench.numerics.kernel_probe import Doubles, Probe
+from clrt.bench.kernel_probe import Doubles, Probe
 from clrt.bench.renderers.mitsuba_scene import mitsuba_scene
 from clrt.device.open import Device
 from clrt.errors import UsageError

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.bench.kernel_probe import Doubles
 from clrt.bench.numerics.bsdf_cases import bsdfs
-from clrt.bench.numerics.kernel_probe import Doubles
 from clrt.bench.numerics.scattering import above
 from clrt.bench.significance import sidak
 from clrt.device.open import Device

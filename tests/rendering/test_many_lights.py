@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
 from clrt.scene.lights import PointLight

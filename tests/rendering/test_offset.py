@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.scene.model import Mesh, Scene, Sphere
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 from clrt.bench.numerics.random_numbers import Draw, draw_on, independence, repetitions, uniformity
 from clrt.bench.significance import rejected
 from clrt.device.open import Device

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clrt.device.launches.buffer_limit import VARIABLE
+from clrt.device.buffer_limit import VARIABLE
 from clrt.device.launches.device_arrays import on_device
 from clrt.device.open import Device
 from clrt.errors import DeviceError, NoRoomError, SceneError, UsageError

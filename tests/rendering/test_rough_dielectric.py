@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clrt.bench.kernel_probe import Doubles
 from clrt.bench.numerics.bsdf_cases import bsdfs, uniform, view
-from clrt.bench.numerics.kernel_probe import Doubles
 from clrt.bench.numerics.scattering import above
 from clrt.device.open import Device
 from clrt.rendering.compile.choices import Choices

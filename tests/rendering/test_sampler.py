@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import ArrayLike
 from scipy.stats import chi2, pearsonr, qmc
 
-from clrt.bench.numerics.kernel_probe import Doubles, Probe
+from clrt.bench.kernel_probe import Doubles, Probe
 from clrt.bench.significance import FAMILY, chi2_test, mean_test, rejected
 from clrt.device.open import Device
 from clrt.scene.materials.material_types import Diffuse

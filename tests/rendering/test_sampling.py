@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 from clrt.bench.numerics.light_sampling import lamps, light_tests, picks, skies
 from clrt.bench.numerics.samplers import AREA, DENSITY
 from clrt.bench.numerics.warps import HEIGHTS, visible_normals, warp_density_errors, warp_p_values, warp_probe

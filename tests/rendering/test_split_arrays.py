@@ -10,8 +10,8 @@ import pyopencl as cl
 import pytest
 
 from clrt.accel.methods import LayoutName
-from clrt.device.launches.buffer_limit import VARIABLE, largest_buffer
-from clrt.device.launches.memory_plan import OVERLAP, part_count, part_records, parts
+from clrt.device.buffer_limit import VARIABLE, largest_buffer
+from clrt.device.memory_plan import OVERLAP, part_count, part_records, parts
 from clrt.device.open import Device
 from clrt.errors import NoRoomError, UsageError
 from clrt.rendering.accumulation.denoiser_guides import render_guides

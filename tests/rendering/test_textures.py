@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.rendering.compile.choices import Lanes
 from clrt.rendering.renderer import Renderer

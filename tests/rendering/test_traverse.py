@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.scene.model import Mesh, Scene, Sphere
 
@@ -224,7 +224,7 @@ from clrt.device.open import open_device
 from clrt.scene.model import Mesh, Scene
 from tests.accel.cases import soup, spheres
 from tests.rendering.test_traverse import balls
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 rays = np.tile([0.5, 0.5, 3.0, 0.1, 0.1, -1.0], (12, 1))
 for i, bad in enumerate((np.nan, np.inf, -np.inf, 0.0)):
     rays[3 * i, :3] = rays[3 * i + 1, 3:] = rays[3 * i + 2] = bad

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.accel.traversal_kernels import TREES
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.scene.model import Scene
 

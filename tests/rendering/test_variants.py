@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.accel.traversal_kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, HitTests
+from clrt.bench.kernel_probe import choices
 from clrt.bench.numerics.bsdf_cases import variants
-from clrt.bench.numerics.kernel_probe import choices
 from clrt.device.open import Device
 from clrt.errors import UsageError
 from clrt.rendering.accumulation import launch_plan

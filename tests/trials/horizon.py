@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 import clrt
-from clrt.bench.numerics.kernel_probe import Doubles
+from clrt.bench.kernel_probe import Doubles
 from clrt.bench.rays.shapes import icosphere
 from clrt.scene.materials.material import Material
 from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror

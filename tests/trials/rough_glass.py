@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from clrt.bench.convergence.contestants import choices_on
-from clrt.bench.numerics.kernel_probe import Doubles
+from clrt.bench.kernel_probe import Doubles
 from clrt.bench.renderers.agreement import BLOCK, block_means, means_of
 from clrt.bench.renderers.mitsuba_glass import scattered
 from clrt.bench.renderers.mitsuba_renderer import contestants

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.scene.lights import LIGHTS, Light
 from clrt.scene.model import Camera, Scene

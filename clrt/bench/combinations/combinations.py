@@ -23,7 +23,7 @@ from ...output.scenes import save_scene
 from ...rendering.accumulation.launch_plan import LaunchPlan
 from ...rendering.accumulation.single_device import SingleDeviceAccumulation
 from ...rendering.compile.compile_scene import compile_scene
-from ..numerics.kernel_probe import choices
+from ..kernel_probe import choices
 from ..renderers.agreement import block_means
 from ..significance import FAMILY, corrected, t_test
 from .identities import MODERATE, PROPERTIES, Side, brightest

@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 
+from ...scene.fields.limits import Ge, Gt, Le, Limit, Lt
 from ...scene.materials.material import Material
 from ...scene.materials.textures import Picture, Texture
-from ...scene.validation.limits import Ge, Gt, Le, Limit, Lt
 from ..numerics.bsdf_cases import NUMBERS
 
 Drawn = TypeVar("Drawn")

@@ -16,7 +16,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from ...device.programs.cache_files import REFERENCES, read_file, write_file
+from ...device.cache_files import REFERENCES, read_file, write_file
 from ...output.image_error import RELMSE_FLOOR
 from ...rendering.renderer import Renderer
 from ...scene.model import Scene

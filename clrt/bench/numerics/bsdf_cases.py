@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...device.open import Device
+from ...scene.fields.limits import Limit
 from ...scene.materials.material import ALPHA_MIN, SHARED
 from ...scene.materials.material_types import MATERIALS, Material
 from ...scene.model import Scene, Sphere
-from ...scene.validation.limits import Limit
-from .kernel_probe import Doubles, Probe
+from ..kernel_probe import Doubles, Probe
 
 #: Test values of fields for which the ends and the middle of the range are not suitable.
 NUMBERS: dict[str, tuple[Any, ...]] = {

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...rendering.compile.records import PIXEL
 from ...rendering.film.film import Film
-from .kernel_probe import Doubles, Probe
+from ..kernel_probe import Doubles, Probe
 
 #: Samples per launch; llvmpipe terminates loops after 65535 iterations.
 LAUNCH = 1 << 15

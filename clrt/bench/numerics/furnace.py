@@ -11,8 +11,8 @@ from ...device.open import Device
 from ...scene.materials.material_types import Dielectric, Diffuse, MetallicRoughness, Mirror
 from ...scene.materials.metallic_roughness import Smith
 from ...scene.materials.microfacets import albedo
+from ..kernel_probe import Doubles
 from .bsdf_cases import Bsdfs, bsdfs
-from .kernel_probe import Doubles
 
 ROUGHNESSES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
 COSINES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 1e-2, 1e-3, 1e-4)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..kernel_probe import Doubles
 from .bsdf_cases import Bsdfs, view
-from .kernel_probe import Doubles
 
 STEP = 2.0**-6
 #: f' ≈ Σ WEIGHTS[k]·(f(x + (k + 1)·step) − f(x − (k + 1)·step))/step. With twice the step the error is 64 times larger;

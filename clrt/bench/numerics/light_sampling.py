@@ -12,8 +12,8 @@ from ...device.open import Device
 from ...scene.lights import DirectionalLight, Light, PointLight
 from ...scene.materials.material_types import Diffuse
 from ...scene.model import Environment, Mesh, Scene, Sphere
+from ..kernel_probe import Doubles, Probe
 from ..significance import chi2_test
-from .kernel_probe import Doubles, Probe
 from .warps import triangle_test, uniform_test
 
 LAMP = Diffuse(emission=(1.0, 1.0, 1.0))

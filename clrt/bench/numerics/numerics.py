@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from ...device.discovery.discover import choose, find_devices
 from ...device.open import open_device
 from ...errors import ClrtError
-from ..rays.hit_agreement import measure_hits
 from .cases.axes import measure_axes
 from .cases.degenerate import measure_degenerate
 from .cases.departures import measure_departures
@@ -20,6 +19,7 @@ from .cases.spheres import measure_spheres
 from .cases.subject import Subject
 from .cases.watertight import measure_watertight
 from .hard_light import measure_pictures
+from .hit_agreement import measure_hits
 from .row import Row
 from .samplers import measure_samplers
 

@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..kernel_probe import Doubles, Probe
 from ..significance import chi2_test, mean_test
-from .kernel_probe import Doubles, Probe
 
 #: Returns (n, 2) random numbers for pixels, samples, dimensions and seeds.
 Draw = Callable[[ArrayLike, ArrayLike, ArrayLike, ArrayLike], Doubles]

@@ -12,12 +12,12 @@ from ...rendering.film.film import Film
 from ...rendering.renderer import Renderer
 from ...scene.materials.material_types import Diffuse, Material
 from ...scene.model import Camera, RenderSettings, Scene, Sphere
+from ..kernel_probe import Probe
 from ..significance import family_row
 from .bsdf_cases import Bsdfs, bsdfs
 from .film_sums import accumulate, stream_errors
 from .furnace import GLASSES, LAYERS, SMITHS, inexact, measure_glass, measure_layers, measure_metals, measure_plastics
 from .jacobians import check_density
-from .kernel_probe import Probe
 from .light_sampling import light_tests
 from .random_numbers import draw_on, independence, repetitions, uniformity
 from .row import Row

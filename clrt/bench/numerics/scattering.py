@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scene.materials.material_types import MATERIALS, Material
+from ..kernel_probe import Doubles
 from ..significance import chi2_test, mean_test
 from . import sphere_cells
 from .bsdf_cases import Bsdfs, layered_variants, plain_variants, uniform, view, views, worded_variants
-from .kernel_probe import Doubles
 
 #: Relative difference of two float32 evaluations of a formula with different contraction (FMA): a dozen roundings.
 ROUNDING = 2e-6

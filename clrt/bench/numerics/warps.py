@@ -10,10 +10,10 @@ from ...device.open import Device
 from ...scene.materials.material import ALPHA_MIN
 from ...scene.materials.material_types import MetallicRoughness
 from ...scene.model import Scene, Sphere
+from ..kernel_probe import Doubles, Probe
 from ..significance import chi2_test
 from .bsdf_cases import uniform, view
 from .jacobians import grid, missed
-from .kernel_probe import Doubles, Probe
 
 #: 1 − cos of the cones' half angles: from the whole sphere of directions down to a sun of 1e-5 degrees.
 HEIGHTS = (2.0, 1.0, 0.3, 1e-3, 1e-7, 1e-14)

@@ -14,7 +14,7 @@ import tempfile
 import time
 from dataclasses import asdict
 
-from ...device.discovery.device_info import DeviceInfo, Speed
+from ...device.device_info import DeviceInfo, Speed
 from ...device.programs.child_process import end_child, last_line, start_child, told_end
 from ...errors import DeviceError
 from ...queries.mesh import RayQuery

@@ -19,7 +19,7 @@ from ...rendering.accumulation.raster_bins import RasterBins
 from ...rendering.compile.compile_scene import compile_scene
 from ...rendering.film.tiles import TILE_PIXELS, tiles_of
 from ...scene.model import Scene
-from ..numerics.kernel_probe import choices
+from ..kernel_probe import choices
 
 #: x, y: position in the image, from −1 to 1; t, u, v, primitive, instance: the hit as in the kernels.
 SEEN = record(x="f4", y="f4", t="f4", u="f4", v="f4", primitive="i4", instance="i4", pad="i4")

@@ -9,12 +9,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..programs import cache_files
+from .. import cache_files
+from ..device_info import DeviceInfo, Verdict, identity_of
 from ..programs.kernel_files import kernel_digest
-from .device_info import DeviceInfo, Verdict
 
 #: Suffix of the files.
 KIND = "check.json"
@@ -42,21 +41,6 @@ def kept_verdict(info: DeviceInfo) -> Verdict | None:
 def forget_verdicts() -> int:
     """Delete all stored verdicts; return how many there were."""
     return cache_files.clear(f"*.{KIND}")
-
-
-def identity_of(info: DeviceInfo) -> dict[str, str]:
-    """Return what results about a device depend on, except for the kernels."""
-    try:
-        own = version("clrt")
-    except PackageNotFoundError:
-        own = "not installed"
-    return {
-        "device": info.id,
-        "name": info.name,
-        "platform_version": info.platform_version,
-        "driver": info.driver,
-        "clrt": own,
-    }
 
 
 def _verdict(stored: Mapping[str, Any]) -> Verdict:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ...file_names import printable
-from ..programs import cache_files
+from .. import cache_files
 
 LIBRARIES = (
     "clrt",

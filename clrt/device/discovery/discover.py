@@ -14,10 +14,11 @@ from typing import Any
 import pyopencl as cl
 
 from ...errors import DeviceError
+from ..device_info import DeviceInfo
+from ..driver_caches import no_room
 from ..launches.fork_safety import check_process
 from .check_results import kept_verdict
-from .device_info import DeviceInfo, describe, describe_empty, describe_faulty, size_of, with_own_id
-from .driver_caches import no_room
+from .describe_device import describe, describe_empty, describe_faulty, size_of, with_own_id
 from .install_advice import no_device
 from .loader import devices_of
 from .measured_speeds import kept_speed

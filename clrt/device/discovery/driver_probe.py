@@ -16,9 +16,9 @@ from collections.abc import Sequence
 from typing import IO
 
 from ...awake import AwakeClock
+from ..driver_caches import no_room
 from ..programs.child_process import activity, end_child, last_line, start_child, told_end
-from .device_info import describe, size_of
-from .driver_caches import no_room
+from .describe_device import describe, size_of
 from .loader import devices_of, load
 
 #: Time limit of all probes together in seconds. A slow start of many GPUs is not a hang.

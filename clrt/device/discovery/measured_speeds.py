@@ -9,10 +9,9 @@ import json
 from dataclasses import asdict
 from math import isfinite
 
-from ..programs import cache_files
+from .. import cache_files
+from ..device_info import DeviceInfo, Speed, identity_of
 from ..programs.kernel_files import kernel_digest
-from .check_results import identity_of
-from .device_info import DeviceInfo, Speed
 
 #: Suffix of the files.
 KIND = "bench.json"

@@ -17,7 +17,7 @@ from typing import Any
 
 import pyopencl as cl
 
-from ..programs import cache_files
+from .. import cache_files
 from .drivers import Driver, installed_drivers
 from .loader import load, load_all
 from .windows_drivers import is_loaded, not_loaded, pip_drivers

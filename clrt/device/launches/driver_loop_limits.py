@@ -13,10 +13,10 @@ import json
 import numpy as np
 import pyopencl as cl
 
-from ..discovery.check_results import identity_of
+from .. import cache_files
+from ..device_info import identity_of
 from ..driver_errors import driver_errors
 from ..open import Device
-from ..programs import cache_files
 from ..programs.program import build, compose, make_kernel
 
 #: Suffix of the files that cache the limits, and the number of iterations up to which a limit is searched for.

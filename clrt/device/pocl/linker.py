@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pyopencl as cl
 
-from ..programs.cache_files import cache_folder, write_file
+from ..cache_files import cache_folder, write_file
 
 #: Path in the cache folder. The script has a folder of its own, which is added to PATH.
 SCRIPT = "linker/ld"

@@ -18,7 +18,7 @@ from functools import partial
 
 import pyopencl as cl
 
-from ..launches.malloc_trim import give_back
+from ..malloc_trim import give_back
 from ..open import open_device
 from .child_process import end_child, start_child
 

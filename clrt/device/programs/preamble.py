@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..launches.memory_plan import OVERLAP, part_count
+from ..memory_plan import OVERLAP, part_count
 from .struct_types import c_typedef
 
 #: C type and array by name; arrays are numpy's or `DeviceArray`s.

@@ -21,13 +21,13 @@ import pyopencl as cl
 
 from ...errors import KernelError
 from ...threads import Event
-from ..discovery.driver_caches import no_room
+from ..cache_files import can_keep, keep_log, read_binary, write_binary
+from ..driver_caches import no_room
 from ..open import Device
 from ..pocl.cpu_name import best_processor, processor_flags
 from ..pocl.kernel_cache import remove_damaged
 from .background_compile import LIMIT, in_background
 from .bitcode import find_bitcode, name_kernels, takes_bitcode
-from .cache_files import can_keep, keep_log, read_binary, write_binary
 from .compile_process import LARGE, compile_aside, quietly_built
 from .kernel_files import kernel_folder
 

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ...scene.fields.limits import Ge, Le
 from ...scene.geometry.transform import Matrix, transform_camera, transform_faults, transform_light, transform_mesh
 from ...scene.materials.material_types import Material
 from ...scene.model import Instance, Model
 from ...scene.validation.field_types import show, unknown
-from ...scene.validation.limits import Ge, Le
 from .placement import Transform
 
 #: Maximum number of instances per table.

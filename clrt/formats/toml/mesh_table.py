@@ -10,12 +10,12 @@ from typing import Annotated
 import numpy as np
 
 from ...errors import SceneError
+from ...scene.fields.limits import Ge, Le, Lt
 from ...scene.geometry.creases import creased
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals, choose_normals
 from ...scene.materials.material_types import Diffuse
 from ...scene.model import Instance, Mesh, Model, Vector
-from ...scene.validation.limits import Ge, Le, Lt
 from ...scene.validation.validate import mesh_problems
 from ..models import read_model
 from .placement import Transform

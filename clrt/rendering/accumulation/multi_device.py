@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...device.launches.memory_plan import check_host
+from ...device.memory_plan import check_host
 from ...device.open import Device
 from ...errors import NoRoomError
 from ..compile.compile_scene import CompiledScene

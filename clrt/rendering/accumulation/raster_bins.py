@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...device.launches.data_parallel import DataParallel
 from ...device.launches.launch import calling
-from ...device.launches.memory_plan import check_room, size
+from ...device.memory_plan import check_room, size
 from ...device.open import Device
 from ...errors import NoRoomError
 from ..compile.compile_scene import CompiledScene

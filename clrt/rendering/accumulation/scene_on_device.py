@@ -15,7 +15,7 @@ from ...device.driver_errors import driver_errors
 from ...device.launches.device_arrays import lent, on_host, same_content
 from ...device.launches.hang_watchdog import warming_up
 from ...device.launches.launch import calling, wait_for
-from ...device.launches.memory_plan import array_bytes, check_memory, part_count, part_records, parts, size
+from ...device.memory_plan import array_bytes, check_memory, part_count, part_records, parts, size
 from ...device.open import Device
 from ...device.programs.background_compile import in_background
 from ...device.programs.program import BuiltProgram, build, make_kernel

@@ -21,9 +21,9 @@ from ...device.programs.kernel_files import kernel_digest
 from ...scene.geometry.instancing import prototypes
 from ...scene.model import RenderSettings, Scene
 from ..compile.choices import Choices
+from ..compile.visible_parts import visible_parts
 
-#: Fields excluded from a Scene, from its settings, from Choices, and from everything in a scene.
-UNSEEN = {"name", "render", "cameras", "animation", "materials", "source"}
+#: Fields excluded from a scene's settings, from Choices, and from everything in a scene.
 ENDS = {"spp"}
 ROUNDING = {"lanes", "layout", "builder", "paths", "tree", "first_hits"}
 NAMES = {"name", "material_name"}
@@ -55,7 +55,7 @@ def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
         "kernels": kernel_digest(),
         "code": code_digest(),
         **{name: str(value) for name, value in values.items()},
-        **{part: _digest(_part(scene, part)) for part in parts_of(scene)},
+        **{part: _digest(_part(scene, part)) for part in visible_parts(scene)},
     }
 
 
@@ -71,14 +71,9 @@ def values_of(settings: RenderSettings, choices: Choices) -> dict[str, Any]:
     return values
 
 
-def parts_of(scene: Scene) -> list[str]:
-    """Return the names of the visible parts of a scene."""
-    return [field.name for field in fields(scene) if field.name not in UNSEEN]
-
-
 def scene_hash(scene: Scene) -> str:
     """Return the SHA-256 of everything that emits, reflects or is visible in the scene."""
-    return _digest([_part(scene, part) for part in parts_of(scene)])
+    return _digest([_part(scene, part) for part in visible_parts(scene)])
 
 
 def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...accel.layouts import Layout
 from ...device.launches.driver_loop_limits import loop_turns
-from ...device.launches.memory_plan import array_bytes, needed_parts
+from ...device.memory_plan import array_bytes, needed_parts
 from ...device.open import Device
 from ...device.programs.preamble import Buffers
 from ...device.programs.program import compose, files_of

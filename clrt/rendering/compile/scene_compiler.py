@@ -10,11 +10,11 @@ import numpy as np
 from ...device.open import Device
 from ...scene.model import Scene
 from ...scene.validation.validate import validate
-from ..checkpoint.identity import parts_of
 from .camera_kernel import camera_file
 from .choices import Choices
 from .compile_scene import CompiledScene, compile_scene
 from .reuse_cache import ReuseCache
+from .visible_parts import visible_parts
 
 #: Settings that affect neither buffers nor programs.
 PASSING = ("size", "spp", "max_depth", "seed", "adaptive")
@@ -69,6 +69,6 @@ def _differs_in_passing(scene: Scene, last: Scene) -> bool:
     """Return whether at most the camera and PASSING settings differ."""
     passing = {name: getattr(last.render, name) for name in PASSING}
     return (
-        all(getattr(scene, name) is getattr(last, name) for name in parts_of(scene) if name != "camera")
+        all(getattr(scene, name) is getattr(last, name) for name in visible_parts(scene) if name != "camera")
         and replace(scene.render, **passing) == last.render
     )

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from ..accumulation.accumulation import Accumulation
 from ..cancellation import NEVER, CancellationToken
-from ..checkpoint.saved_state import SavedState
 from ..film.film import Film
 from ..film.state import State, relmse
 from ..film.tiles import mean_samples
@@ -27,9 +26,9 @@ class Convergence:
         self.noise, self._percentile = NoiseEstimate(planned_spp), percentile
         self.history: list[dict[str, Any]] = []
 
-    def restore(self, kept: SavedState) -> None:
+    def restore(self, noise: NoiseEstimate, history: list[dict[str, Any]]) -> None:
         """Resume from a saved state."""
-        self.noise, self.history = kept.noise, kept.history
+        self.noise, self.history = noise, history
 
     def state(
         self,

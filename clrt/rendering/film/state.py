@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...errors import UsageError
 from ...float_errors import with_default_errors
-from ...scene.validation.number_arrays import real_array
+from ...scene.fields.number_arrays import real_array
 from .film import RELATIVE_FLOOR, Film
 
 

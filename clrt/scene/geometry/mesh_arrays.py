@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import SceneError
-from ..validation.number_arrays import real_array, whole_array
+from ..fields.number_arrays import real_array, whole_array
 
 Floats = NDArray[np.float32]
 Points = NDArray[np.float32] | NDArray[np.float64]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import UsageError
-from ..validation.number_arrays import real_array
+from ..fields.number_arrays import real_array
 
 Rays = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 

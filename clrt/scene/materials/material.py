@@ -8,9 +8,9 @@ from functools import lru_cache
 from types import NoneType
 from typing import Annotated, Any, ClassVar, Self, get_args, get_origin, get_type_hints
 
+from ..fields.limits import Ge, Le
+from ..fields.tuples import tuples_for_lists
 from ..render_settings import Culling
-from ..validation.limits import Ge, Le
-from ..validation.tuples import tuples_for_lists
 from .textures import NonNegative, Texture
 
 Unit = Annotated[float, Ge(0), Le(1)]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from math import log
 from typing import Annotated, ClassVar
 
-from ..validation.limits import Ge, Gt, Le
+from ..fields.limits import Ge, Gt, Le
 from .dielectric_energy import ROWS, tables
 from .material import Albedo as Albedo, Material as Material, Parameter, Unit
 from .metallic_roughness import MetallicRoughness as MetallicRoughness

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
-from ..validation.limits import Ge, Le
+from ..fields.limits import Ge, Le
 from . import layer_energy
 from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
 from .presets import F0_PRESETS, Preset

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..validation.limits import Ge, Lt
+from ..fields.limits import Ge, Lt
 
 Channel = Literal["red", "green", "blue", "alpha"]
 Wrap = Literal["repeat", "mirror", "clamp"]

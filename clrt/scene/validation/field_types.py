@@ -15,8 +15,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 import numpy as np
 
+from ..fields.limits import Ge, Gt, Le, Limit, Lt
 from ..materials.textures import Texture
-from .limits import Ge, Gt, Le, Limit, Lt
 
 #: Fields whose values are not plain data; the code that uses them validates them.
 ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "to_world"})

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from ...accel.traversal_kernels import BUILDER_NAMES, TREES, TRIANGLE_TESTS
 from ...live.settings import Settings
 from ...output.view_transform import VIEWS
-from ...scene.validation.limits import Ge, Le
+from ...scene.fields.limits import Ge, Le
 from ..editor import Editor
 from ..fields import choose, edit, edit_fields
 from ..tone_mapping import DisplaySettings

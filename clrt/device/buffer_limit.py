@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 
-from ...errors import UsageError
+from ..errors import UsageError
 
 #: For developers: an upper bound on a device's largest buffer, such as 1M.
 VARIABLE = "CLRT_MAX_ALLOC"

@@ -14,11 +14,11 @@ from ...device.discovery.discover import choose, find_devices
 from ...errors import ClrtError, UsageError
 from ...queries.base import TRAVERSALS
 from ...queries.mesh import RayQuery
-from ..numerics.aimed_rays import all_rays, rays_of_kinds
-from ..numerics.exact_hits import UNDECIDED, areas, closest_bounds
-from .ray_speed import Rays, differing, every
-from .shapes import icosphere, soup
-from .workloads import Mesh, bumpy_ball
+from ..rays.ray_speed import Rays, differing, every
+from ..rays.shapes import icosphere, soup
+from ..rays.workloads import Mesh, bumpy_ball
+from .aimed_rays import all_rays, rays_of_kinds
+from .exact_hits import UNDECIDED, areas, closest_bounds
 
 
 class Effort(NamedTuple):

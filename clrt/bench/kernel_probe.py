@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...accel.methods import HitTests
-from ...device.launches.device_arrays import empty_array, on_device
-from ...device.launches.launch import run_kernel
-from ...device.open import Device
-from ...device.programs.program import build, make_kernel
-from ...rendering.compile.choices import Choices
-from ...rendering.compile.compile_scene import compile_scene
-from ...scene.model import Scene
+from ..accel.methods import HitTests
+from ..device.launches.device_arrays import empty_array, on_device
+from ..device.launches.launch import run_kernel
+from ..device.open import Device
+from ..device.programs.program import build, make_kernel
+from ..rendering.compile.choices import Choices
+from ..rendering.compile.compile_scene import compile_scene
+from ..scene.model import Scene
 
 Doubles = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import NoRoomError
-from ..discovery.device_info import DeviceInfo
+from ..errors import NoRoomError
 from .buffer_limit import VARIABLE
+from .device_info import DeviceInfo
 
 #: Records that a part shares with the next one, so that a leaf's records are never in two parts
 #: (kernels/core/arrays.cl).

@@ -1,0 +1,1 @@
+"""Types and limits of fields: of numbers, tuples and arrays of numbers."""
