@@ -33,9 +33,11 @@ def soup(request: pytest.FixtureRequest, device: Device) -> clrt.RayQuery:
     return clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout=layout, traversal=traversal)
 
 
-def brute_force(origins: Doubles, directions: Doubles) -> tuple[Doubles, Doubles]:
+def brute_force(
+    origins: Doubles, directions: Doubles, corners: NDArray[np.float32] = VERTICES[FACES]
+) -> tuple[Doubles, Doubles]:
     """Return (n, m) float64: t of every ray at every triangle, inf outside, and how deep inside the hit lies."""
-    p0, p1, p2 = (VERTICES[FACES[:, i]].astype(np.float64) for i in range(3))
+    p0, p1, p2 = (corners[:, i].astype(np.float64) for i in range(3))
     normal = np.cross(p1 - p0, p2 - p0)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = ((p0 * normal).sum(1) - origins @ normal.T) / (directions @ normal.T)
@@ -74,6 +76,28 @@ def test_any_hit_agrees_with_closest_hit(soup: clrt.RayQuery) -> None:
     short = soup.closest_hit(ORIGINS, DIRECTIONS, limit)
     np.testing.assert_array_equal(short["primitive"], np.where(hits["t"] < limit, hits["primitive"], -1))
     assert np.isinf(short["t"][short["primitive"] < 0]).all()
+
+
+@pytest.mark.parametrize("kind", ["bvh8-single", "bvh8-packet", "bvh8-pool", "bvh2-single", "cwbvh-single"])
+def test_the_end_of_a_ray_is_exact(device: Device, kind: str) -> None:
+    """A ray that ends just behind the nearest triangle hits it, one that ends just before it hits nothing.
+
+    The triangles are parallel to two axes, so that a ray enters their boxes where it hits them.
+    """
+    rng = np.random.default_rng(7)
+    corners = rng.uniform(-1, 1, (400, 3, 3))
+    corners[np.arange(400), :, rng.integers(3, size=400)] = rng.uniform(-1, 1, (400, 1))
+    vertices, faces = corners.reshape(-1, 3).astype(np.float32), np.arange(1200).reshape(-1, 3)
+    layout, traversal = kind.split("-")
+    query = clrt.RayQuery(vertices, faces, device=device.info.index, layout=layout, traversal=traversal)
+    t, depth = brute_force(ORIGINS.astype(np.float64), DIRECTIONS.astype(np.float64), vertices[faces])
+    nearest, length = t.min(axis=1), np.linalg.norm(DIRECTIONS, axis=1)
+    clear = (np.abs(depth) > 1e-5).all(axis=1) & (nearest * length > 0.1) & np.isfinite(nearest)
+    assert clear.sum() > 300
+    rays, primitive = (ORIGINS[clear], DIRECTIONS[clear]), t.argmin(axis=1)[clear]
+    behind, before = nearest[clear] * (1 + 1e-4), nearest[clear] * (1 - 1e-4)
+    np.testing.assert_array_equal(query.closest_hit(*rays, behind)["primitive"], primitive)
+    assert query.any_hit(*rays, behind).all() and not query.any_hit(*rays, before).any()
 
 
 def test_all_hits_are_those_of_brute_force(soup: clrt.RayQuery) -> None:
