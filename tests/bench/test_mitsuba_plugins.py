@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.bench.renderers.mitsuba_glass import losses
-from clrt.bench.renderers.mitsuba_layers import ROOTS
+from clrt.bench.renderers.mitsuba_plugins.glass_losses import losses
+from clrt.bench.renderers.mitsuba_plugins.layer_tables import ROOTS
 from clrt.scene.materials.dielectric_energy import at_cosines, grazing, sides
 
 

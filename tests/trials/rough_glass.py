@@ -13,7 +13,7 @@ import numpy as np
 from clrt.bench.convergence.contestants import choices_on
 from clrt.bench.kernel_probe import Doubles
 from clrt.bench.renderers.agreement import BLOCK, block_means, means_of
-from clrt.bench.renderers.mitsuba_glass import scattered
+from clrt.bench.renderers.mitsuba_plugins.glass_losses import scattered
 from clrt.bench.renderers.mitsuba_renderer import contestants
 from clrt.device.discovery.discover import choose
 from clrt.scene.materials.material_types import Dielectric

@@ -1,6 +1,5 @@
 """Conversion of materials to Mitsuba 3: its own plugins where they are equivalent, wrapped in `height_correlated`
-(mitsuba_smith.py) where their Smith term differs, and plugins for what it lacks (mitsuba_gltf.py, mitsuba_phong.py,
-mitsuba_glass.py).
+where their Smith term differs, and plugins for what it lacks (mitsuba_plugins/).
 
 To add a material, write its conversion in BSDFS.
 """

@@ -14,13 +14,14 @@ import numpy as np
 
 from ...scene.model import Scene
 from ..convergence.contestants import Contestant, Picture
-from . import mitsuba_glass, mitsuba_gltf, mitsuba_phong, mitsuba_smith
 from .mitsuba_bsdfs import Plugin
 from .mitsuba_scene import mitsuba_scene
 
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 #: Samplers by suffix of the contestant's name.
 SAMPLERS = {"": "independent", ", multijitter": "multijitter"}
+#: Modules in mitsuba_plugins/ that register a BSDF.
+PLUGINS = ("gltf_bsdf", "height_correlated", "phong_bsdf", "rough_glass_bsdf", "sheet_bsdf")
 #: Older versions cannot compile Mitsuba's code, and terminate the process.
 OLDEST_LLVM = 17
 LLVM_FOLDERS = ("usr/lib", "usr/lib64", "usr/lib/*-linux-gnu", "usr/lib/llvm*/lib", "usr/local/lib")
@@ -75,8 +76,8 @@ def load() -> tuple[Any, str]:
     library = import_module("mitsuba")
     library.set_variant(variant)
     library.set_log_level(library.LogLevel.Error)
-    for plugins in (mitsuba_glass, mitsuba_gltf, mitsuba_phong, mitsuba_smith):
-        plugins.register(library)
+    for plugin in PLUGINS:
+        import_module(f".mitsuba_plugins.{plugin}", __package__)
     return library, f"mitsuba {variant.split('_')[0]}"
 
 

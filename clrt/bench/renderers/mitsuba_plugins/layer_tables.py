@@ -1,4 +1,4 @@
-"""Tables for Mitsuba's plugin of metallic-roughness (mitsuba_gltf.py): what microfacets, clearcoat ("film") and sheen
+"""Tables for the plugin of metallic-roughness (gltf_bsdf.py): what microfacets, clearcoat ("film") and sheen
 ("fibres") reflect and transmit by angle, after docs/scene-format.md. All integrals are midpoint sums of its own.
 """
 
@@ -8,9 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...scene.materials.material import ALPHA_MIN
-from ...scene.materials.metallic_roughness import Smith
-from ...scene.materials.microfacets import Doubles, albedos, shadowing
+from ....scene.materials.material import ALPHA_MIN
+from ....scene.materials.metallic_roughness import Smith
+from ....scene.materials.microfacets import Doubles, albedos, shadowing
 
 #: Tabulated angles, uniform in the root of the cosine, and those of an integral in each dimension.
 SIDE, POINTS = 128, 192
