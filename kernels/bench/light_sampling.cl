@@ -1,7 +1,9 @@
-// Replaces integrator/mis.cl: light sampling finds all light except what it never samples: skies below their mean, and
-// light along specular directions.
+// Replaces integrator/mis.cl: light sampling finds all light except what it samples never or hardly: skies below or near
+// their mean, and light along specular directions.
 #include "core/sampling.cl"
 
-static inline real light_sample_weight(real pdf, real bsdf_pdf) { return ONE; }
+#define HARDLY 0.01f   // of the density of BSDF sampling: weights stay below 1/HARDLY, so that their mean is found soon
 
-static inline real bsdf_sample_weight(real pdf, real light_pdf) { return light_pdf > 0.0f ? ZERO : ONE; }
+static inline real light_sample_weight(real pdf, real bsdf_pdf) { return pdf > HARDLY * bsdf_pdf ? ONE : ZERO; }
+
+static inline real bsdf_sample_weight(real pdf, real light_pdf) { return light_pdf > HARDLY * pdf ? ZERO : ONE; }

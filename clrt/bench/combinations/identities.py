@@ -53,6 +53,8 @@ def strategies(scene: Scene, draws: Draws) -> list[Side]:
     """BSDF sampling and light sampling alone have the mean of both combined (MIS).
 
     Each leaves to the other what it cannot sample: delta lights, specular directions, environments below their mean.
+    Light sampling also leaves directions whose density is below a hundredth of BSDF sampling's, as in texels that are
+    hardly brighter than the mean: their samples are so rare and bright that their variance is not seen.
     """
     return [
         Side("both", [scene]),
