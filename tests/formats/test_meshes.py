@@ -281,19 +281,20 @@ BROKEN = {
     "header.ply": (STRIPS[:90], "cannot be read as PLY"),
     "empty.ply": ("", "cannot be read as PLY"),
     "empty.stl": ("", "contains no triangles"),
-    "above.off": ("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n", "cannot be read as OFF"),
+    # Newer versions of trimesh reject it themselves.
+    "above.off": ("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n", "cannot be read as OFF|faces[0] uses vertex 7"),
     "a.fbx": ("", "a model must be one of .glb, .gltf"),
 }
 
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_broken_models(name: str, tmp_path: Path) -> None:
-    content, sentence = BROKEN[name]
+    content, sentences = BROKEN[name]
     (tmp_path / name).write_text(content)
     with pytest.raises(SceneError) as caught:
         read_mesh(tmp_path / name)
     (problem,) = caught.value.problems
-    assert problem.startswith(f"{tmp_path / name}: ") and sentence in problem
+    assert problem.startswith(f"{tmp_path / name}: ") and any(each in problem for each in sentences.split("|"))
 
 
 def test_missing_model(tmp_path: Path) -> None:

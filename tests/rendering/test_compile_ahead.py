@@ -86,6 +86,7 @@ def test_large_scenes_are_left_alone(device: Device, monkeypatch: pytest.MonkeyP
     asked, waits = list[str](), list[Callable[[], None]]()
     monkeypatch.setattr(ahead, "compile_ahead", lambda device, source: asked.append(source))
     monkeypatch.setattr(ahead, "is_kept", lambda device, source: False)
+    monkeypatch.setattr(ahead, "_processors", lambda: 2)
     monkeypatch.setattr(ahead, "beside", lambda work, **_: waits.append(beside(work)))
     scene = clrt.load(MODEL)
     scene.environment = clrt.Environment(image=np.ones((size, 2 * size, 3), np.float32))
