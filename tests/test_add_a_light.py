@@ -32,6 +32,7 @@ def piece(text: str, language: str) -> str:
     return re.sub("^   ", "", str(code), flags=re.MULTILINE)
 
 
+@pytest.mark.programs
 def test_the_steps_make_a_light(tmp_path: Path) -> None:
     """On the axis of a disk of radius r at the distance d, E = pi·L·r²/(r² + d²), and a white floor reflects E/pi."""
     shutil.copytree(HOUSE / "clrt", tmp_path / "clrt")

@@ -42,6 +42,7 @@ def reflected(cosine: float) -> float:
     return float(COLOR * np.pi * (a + a * ROUGHNESS * s / t).mean())
 
 
+@pytest.mark.programs
 def test_the_steps_make_a_material(tmp_path: Path) -> None:
     shutil.copytree(HOUSE / "clrt", tmp_path / "clrt")
     shutil.copytree(HOUSE / "kernels", tmp_path / "clrt" / "kernels")

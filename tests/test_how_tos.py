@@ -20,6 +20,7 @@ PAGES = {
 }
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("name", PAGES)
 def test_examples_print_what_they_say(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

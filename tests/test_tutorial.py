@@ -27,6 +27,7 @@ WRITTEN = (
 )
 
 
+@pytest.mark.programs
 def test_every_step_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs the commands, scene file and Python program as printed; the comment after a print is its output."""
     monkeypatch.chdir(tmp_path)

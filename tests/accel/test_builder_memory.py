@@ -17,6 +17,7 @@ from ..covering import covering
 from .cases import soup, spheres
 
 
+@pytest.mark.programs
 @covering("layout, builder", SHAPES, ["ploc", "reinsertion"])
 def test_no_array_is_larger_than_foretold(
     device: Device, monkeypatch: pytest.MonkeyPatch, layout: str, builder: str
@@ -45,6 +46,7 @@ def test_where_there_is_no_room_numpy_builds(device: Device) -> None:
     assert build_tree(device, "bvh8", None, triangles).builder == "ploc"
 
 
+@pytest.mark.programs
 def test_short_launches_build_the_same_tree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """The build is split into launches of few items each."""
     triangles = soup(5_000, 0.1)

@@ -65,6 +65,7 @@ LARGE = ("binary tree", "tree builder", "furnace", "lamp", "ball", "room")
 SMALL = [name for name, (part, *_) in SABOTAGES.items() if part not in LARGE]
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("name", SMALL + others(*(name for name in SABOTAGES if name not in SMALL)))
 def test_what_is_broken_is_found(best: Device, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     part, *edit = SABOTAGES[name]

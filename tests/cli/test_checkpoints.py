@@ -98,6 +98,7 @@ def arrays(path: Path) -> dict[str, bytes]:
     return {name: array.tobytes() for name, array in read_checkpoint(path, KINDS)[1].items() if name != "history"}
 
 
+@pytest.mark.processes
 @pytest.mark.parametrize(
     "kills, options", [(3, ["--spp", "2000"]), (2, ["--spp", "600", "--adaptive"])], ids=["even", "adaptive"]
 )

@@ -56,6 +56,7 @@ def test_the_default_is_the_pixel_in_the_center(scene: Path) -> None:
     assert default == named and default["pixel"] == [4, 3]
 
 
+@pytest.mark.programs
 def test_it_is_the_pixel_of_the_render(scene: Path) -> None:
     """The values equal those of `clrt render` with the same options."""
     options = (

@@ -133,6 +133,7 @@ def test_models(folder: Path, suffix: str) -> None:
     assert load(path).name == "sc\\xe8ne" and sum(len(mesh.faces) for mesh in load(path).meshes) == 12
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(
     ("name", "locale"),
     [

@@ -136,6 +136,7 @@ def test_gifs_keep_time(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.cumsum(lasting), 1000 / 24 * np.arange(1, 31), atol=5)
 
 
+@pytest.mark.processes
 def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> None:
     wanted = [
         sys.executable,

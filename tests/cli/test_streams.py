@@ -93,6 +93,7 @@ def test_an_interrupt_before_it_has_begun(folder: Path) -> None:
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("change", ["# ü\n", *others("", "\r\n")])
 def test_a_scene_from_standard_input(folder: Path, change: str) -> None:
     """Relative file names are resolved from the working folder."""

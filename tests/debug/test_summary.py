@@ -98,6 +98,7 @@ REASONS: dict[str, tuple[Scene, str]] = {
 FURTHER = ["roof behind a veil", "wound backwards", "absorbed", "mirror"]
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("name", [*(name for name in REASONS if name not in FURTHER), *others(*FURTHER)])
 def test_why_it_is_black(device: Device, name: str) -> None:
     scene, reason = REASONS[name]

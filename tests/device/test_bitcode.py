@@ -76,6 +76,7 @@ def test_a_program_is_built_of_its_bitcode(tmp_path: Path, monkeypatch: pytest.M
     assert find_bitcode(f"_{keys[0][:32]}") is None
 
 
+@pytest.mark.programs
 def test_without_pocl_s_files_a_program_is_built_of_its_source(tmp_path: Path) -> None:
     """If PoCL's files are missing, bitcode in clrt's cache is still used."""
     keys, _, values = built(tmp_path)
@@ -86,6 +87,7 @@ def test_without_pocl_s_files_a_program_is_built_of_its_source(tmp_path: Path) -
     assert built(tmp_path) == (keys, [False, True], values)
 
 
+@pytest.mark.programs
 def test_pictures_are_the_same_of_bitcode(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(SCENE)
     for picture in ("first.exr", "again.exr"):

@@ -114,6 +114,7 @@ def test_edits_of_values_build_nothing_and_show_what_a_render_shows(live: Live, 
     assert check_as_rendered(live, device).tree["nodes"] == 0
 
 
+@pytest.mark.programs
 def test_what_is_seen_at_a_place(live: Live) -> None:
     """Works during a render and at rest; removed objects are not picked, and after an error the last image counts."""
     ball, mesh = live.scene.spheres[0], live.scene.meshes[1]
@@ -129,6 +130,7 @@ def test_what_is_seen_at_a_place(live: Live) -> None:
     assert whole(live).error is not None and live.pick(0.5, 0.5).result(SECONDS) is mesh
 
 
+@pytest.mark.programs
 def test_moved_instances_keep_the_trees_of_their_meshes(device: Device) -> None:
     """Only the upper level is rebuilt; the image equals that of a new render."""
     vertices, faces = icosphere(6)

@@ -75,6 +75,7 @@ def run(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command("ball.toml", *arguments), cwd=folder, capture_output=True, text=True)
 
 
+@pytest.mark.statistics
 def test_the_error_is_less_than_an_eighth(image: clrt.Image, converged: Floats) -> None:
     """Denoising eight samples helps as much as another sixty samples. Over 48 seeds the ratio of relMSE was 0.086 on
     average, with a standard deviation of 0.01."""
@@ -135,6 +136,7 @@ def test_any_unit_will_do(image: clrt.Image, guides: dict[str, Floats], scale: f
     np.testing.assert_allclose(scaled / scale, image.pixels, rtol=1e-3, atol=1e-3)
 
 
+@pytest.mark.programs
 def test_nothing_is_left_in_memory() -> None:
     """Five denoisers of such an image need 60 MB each; memory grows by less than 100 MB."""
     pixels = np.full((256, 256, 3), 0.5, np.float32)

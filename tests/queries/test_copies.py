@@ -58,6 +58,7 @@ def assert_same(one: Any, other: Any) -> None:
         np.testing.assert_array_equal(found, expected)
 
 
+@pytest.mark.programs
 @covering("name, how", OPTIONS, COPIES)
 def test_a_copy_answers_the_same(device: Device, name: str, how: str) -> None:
     """Copies made before and after a query or a refit give the same hits and share no mutable state."""
@@ -74,6 +75,7 @@ def test_a_copy_answers_the_same(device: Device, name: str, how: str) -> None:
     assert before.closest_hit(*RAYS)["t"].tobytes() != after.closest_hit(*RAYS)["t"].tobytes()
 
 
+@pytest.mark.programs
 @covering("layout, how", ["bvh8", "bvh2", "cwbvh"], COPIES)
 def test_a_copy_of_instances(device: Device, how: str, layout: str) -> None:
     """A copy of instances gives the same hits, also if the original or the copy moves."""

@@ -98,6 +98,7 @@ def test_places_and_numbers_are_those_of_the_middle_s_ray(at: Any, scale: float)
     assert np.array_equal(found["primitive"], np.where(missed, -1, on_floor & ~half))
 
 
+@pytest.mark.programs
 def test_numbers_count_by_objects_and_by_materials() -> None:
     """Primitive ids count triangles within their mesh, object ids meshes then spheres; equal materials share an id."""
 
@@ -138,6 +139,7 @@ def test_albedo_and_normals_are_of_the_first_surface() -> None:
     assert np.all(found["object"] == -1) and np.all(found["depth"] == np.inf)
 
 
+@pytest.mark.programs
 def test_textures_and_normal_maps_are_seen() -> None:
     """Albedo is that of the texels; normal maps bend the normal but not the geometric one; materials are left out of
     the program if no AOV needs them.
@@ -205,6 +207,7 @@ def test_albedo_is_a_mean_over_the_pixel() -> None:
     assert not found["albedo"][:, 3:].any()
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(
     "options", [{}, *others({"adaptive": True}, {"lanes": 1, "filter": "blackman_harris"})], ids=str
 )

@@ -250,6 +250,7 @@ static inline ireal ray_through(const Launch *launch, real sx, real sy, Sampler 
 """
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("paths, lanes", [("waves", 8), ("lanes", 8), ("lanes", 1)])
 def test_a_camera_may_have_no_ray(
     device: Device, paths: str, lanes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

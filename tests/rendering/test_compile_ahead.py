@@ -38,6 +38,7 @@ def test_an_outline_has_the_scene_s_program(device: Device, name: str) -> None:
     assert outlined.counts["triangles"] < whole.counts["triangles"]
 
 
+@pytest.mark.programs
 def test_each_program_is_compiled_once(tmp_path: Path) -> None:
     """A render compiles two programs, the BVH builder's and the scene's, and a second render none."""
     places = {

@@ -69,6 +69,7 @@ def test_the_camera_looks_through_back_faces(
         np.testing.assert_array_equal(found, np.broadcast_to(RADIANCE * culled, (8, 8, 3)))
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("few_triangles", [0, *others(1 << 20)], ids=["instance", "mesh"])
 @pytest.mark.parametrize("culling", ["all", *others("camera", "none")])
 @pytest.mark.parametrize(
@@ -102,6 +103,7 @@ def test_mirrored_instances(
         np.testing.assert_allclose(film(device, scene).mean, np.broadcast_to(expected, (8, 8, 3)), rtol=1e-6)
 
 
+@pytest.mark.programs
 @covering("integrator, culling", ["depth", "albedo", "normals"], CULLINGS)
 def test_pictures_of_what_is_seen_first(device: Device, integrator: Integrator, culling: Culling) -> None:
     """They show the wall, or the floor behind it if the wall is culled."""
@@ -125,6 +127,7 @@ def test_aovs_of_what_is_seen_first(device: Device, culling: Culling) -> None:
     assert image.report["back_face_culling"] == culling
 
 
+@pytest.mark.programs
 @covering("integrator, culling", ["path", "local"], CULLINGS)
 def test_shadow_rays_pass_back_faces_where_all_are_culled(
     device: Device, integrator: Integrator, culling: Culling
@@ -141,6 +144,7 @@ def test_shadow_rays_pass_back_faces_where_all_are_culled(
         assert found == pytest.approx(expected, rel=1e-5)
 
 
+@pytest.mark.programs
 @covering("integrator, culling", ["local", "path"], CULLINGS)
 def test_mirrors_show_what_the_camera_does_not_see(device: Device, integrator: Integrator, culling: Culling) -> None:
     """A mirror shows the back of a wall in front of an emitter, unless culling applies to all rays."""
@@ -150,6 +154,7 @@ def test_mirrors_show_what_the_camera_does_not_see(device: Device, integrator: I
     np.testing.assert_allclose(found, np.broadcast_to(RADIANCE * (culling == "all"), (8, 8, 3)), rtol=1e-6)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("culling", ["camera", "all"])
 def test_closed_surfaces_look_the_same(device: Device, culling: Culling) -> None:
     """Camera rays hit fronts first; light inside glass still hits the backs, and no extra code is compiled."""

@@ -41,6 +41,7 @@ def test_quantiles(name: str) -> None:
     assert np.allclose(coverage(name, places[::64]), np.arange(0, CELLS + 1, 64) / CELLS, atol=1e-5)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("name", DENSITIES)
 def test_an_edge_is_blurred_by_the_filter(device: Device, name: Filter) -> None:
     """An emissive wall ends at a third of a pixel: pixels near it see the share that their filters cover."""

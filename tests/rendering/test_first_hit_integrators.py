@@ -48,6 +48,7 @@ def met(origin: Doubles, w: Doubles) -> Doubles:
     return np.where(t > 0, t, np.nan)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("name", ["rolled", "lens", "parallel", "all around"])
 @pytest.mark.parametrize("unit", [1.0, 2.0**-30])
 def test_depth_of_a_ball(device: Device, name: str, unit: float) -> None:
@@ -126,6 +127,7 @@ def test_pictures_are_what_guides_are(device: Device) -> None:
         np.testing.assert_allclose(render_guides(running, 16)[guide], running.film().mean, atol=1e-6)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("integrator", ["albedo", *others("normals", "depth")])
 def test_no_light_is_compiled_or_missed(
     device: Device, integrator: Integrator, caplog: pytest.LogCaptureFixture

@@ -80,6 +80,7 @@ def test_albedo_is_what_a_furnace_shows(device: Device, material: Material, tole
     np.testing.assert_allclose(guides(device, scene)["albedo"].mean(axis=(0, 1)), shown, atol=tolerance)
 
 
+@pytest.mark.programs
 def test_normals_of_a_sphere(device: Device) -> None:
     """In pixels that the sphere covers: the mean over the pixel, by quadrature in float64."""
     camera, size, center, radius = Camera(position=(3.0, 2.0, 4.0)), (20, 15), np.array([0.2, -0.1, 0.0]), 1.3
@@ -162,6 +163,7 @@ def test_glass_is_looked_through(device: Device) -> None:
     everywhere(found["normal"], (-1, 0, 0))
 
 
+@pytest.mark.programs
 def test_glass_absorbs(device: Device) -> None:
     """What is seen through a pane 1 unit thick is tinted by its transmittance, also the sky."""
     glass = Dielectric(color=(0.9, 0.8, 0.5), attenuation_color=(0.49, 0.25, 0.04), attenuation_distance=2.0)

@@ -126,6 +126,7 @@ def test_instances_look_like_meshes(device: Device, kind: str) -> None:
     assert 0.1 < (np.abs(expected - expected[0, 0]).max(axis=2) > 0.01).mean()  # A large part of the image is covered
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("kind", ["turned", "stretched", "mirrored"])
 def test_textures_normal_maps_and_colours_go_along(device: Device, kind: str) -> None:
     """Also with normal maps that only some instances have, or have for another UV set, and partial opacity."""
@@ -283,6 +284,7 @@ def test_checkpoints_tell_instances_apart() -> None:
     assert all(facts[0]["instances"] != other["instances"] for other in facts[2:])
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("few", [0, *others(1 << 16)])
 def test_numbers_of_objects(device: Device, few: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ids count meshes, instances, then spheres, from left to right, however each is stored: a mesh that is also drawn

@@ -143,6 +143,7 @@ def test_glass_is_followed_both_ways(device: Device) -> None:
     assert np.allclose(found, np.multiply(SKY, share + (1 - share) * np.array(RED)), atol=noise)
 
 
+@pytest.mark.programs
 def test_lamps_are_sampled_as_the_direct_integrator_does(device: Device) -> None:
     lamp = quad([(-1, 2, -1), (1, 2, -1), (1, 2, 1), (-1, 2, 1)], Diffuse(color=(0.0,) * 3, emission=(3.0, 2.0, 1.0)))
     scene = Scene(
@@ -156,6 +157,7 @@ def test_lamps_are_sampled_as_the_direct_integrator_does(device: Device) -> None
     np.testing.assert_allclose(found, expected, rtol=0.01)
 
 
+@pytest.mark.programs
 def test_lanes_agree_and_paths_pay_nothing(device: Device) -> None:
     scene = Scene(
         meshes=[ground(Phong())],

@@ -26,6 +26,7 @@ def last(renderer: Renderer) -> State:
     return list(renderer.passes(spp=6))[-1]
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(("count", "cameras"), [(1, [ASIDE, LENS, LENS, HERE]), (2, [ASIDE])], ids=["alone", "crew"])
 def test_pictures_are_those_of_new_renderers(device: Device, count: int, cameras: list[Camera]) -> None:
     """Also after an image that was left unfinished; adding or removing a lens switches to another program and

@@ -65,6 +65,7 @@ def test_a_limit_is_found_where_there_is_one(device: Device) -> None:
     assert measured_turns(device) == loop_turns(device)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("turns", [1, 30_000, 100_000])
 def test_short_launches_change_nothing(device: Device, turns: int, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = picture(device)
@@ -103,6 +104,7 @@ def test_work_is_shortened_in_order() -> None:
     assert work.samples.tolist() == [[7, 7, 7]]
 
 
+@pytest.mark.programs
 def test_samples_that_were_ended_are_missed(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Kernels are changed as if the loops of every fifth pixel had been ended."""
     limit(monkeypatch, 50_000)
@@ -112,6 +114,7 @@ def test_samples_that_were_ended_are_missed(device: Device, tmp_path: Path, monk
         picture(device)
 
 
+@pytest.mark.programs
 def test_too_many_turns_are_refused(device: Device) -> None:
     """A path of depth 1024 with a long list; without a limit, all of its light arrives."""
     if loop_turns(device) is None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, get_args, get_type_hints
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from clrt.bench.numerics.bsdf_cases import variants
@@ -60,6 +61,7 @@ def names_of(records: NDArray[Any]) -> set[str]:
     return {name for name in records.dtype.names or () if not name.startswith(("pad", "rest"))}
 
 
+@pytest.mark.programs
 @covering("kind, seed", MATERIALS, range(5))
 def test_materials_are_packed_together_as_alone(kind: type[Material], seed: int) -> None:
     """A record equals that of the material packed alone, and refers to no texture that the material does not use."""

@@ -41,6 +41,7 @@ def rays_to(points: Doubles, normal: Doubles, distance: float) -> tuple[Doubles,
     return origin, points - origin
 
 
+@pytest.mark.programs
 @covering("axis, offset", [(0.5, 0.7, -0.3), (0.0, 1.0, 0.0)], OFFSETS)
 def test_plane(device: Device, offset: float, axis: tuple[float, float, float]) -> None:
     """One large triangle, offset on all axes, with rays on both sides."""
@@ -102,6 +103,7 @@ def test_far_away_a_fixed_distance_is_not_enough(device: Device, offset: str, sh
         assert np.all(np.sum((out[:, 10:13] - out[:, 1:4]) * side, axis=1)[hit] > 0)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("size", [1.0, 2.0**-40])
 @pytest.mark.parametrize("offset, distance", [("fixed", 1e-3), ("ulp", 2.0**-16)])
 def test_lengths_of_offsets_are_those_of_the_scene(device: Device, offset: str, distance: float, size: float) -> None:

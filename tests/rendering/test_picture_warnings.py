@@ -36,6 +36,7 @@ def said(device: Device, caplog: pytest.LogCaptureFixture, scene: Scene, **optio
     return list(report["warnings"])
 
 
+@pytest.mark.programs
 def test_a_picture_that_is_right_says_nothing(device: Device, caplog: pytest.LogCaptureFixture) -> None:
     for integrator in ("path", "local", "normals"):
         assert said(device, caplog, BALL, integrator=integrator) == []

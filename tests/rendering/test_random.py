@@ -35,6 +35,7 @@ def test_numbers_are_uniform(draw: Draw) -> None:
     assert len(p_values) > 1000 and not rejected(p_values)
 
 
+@pytest.mark.statistics
 def test_neighbours_are_unrelated(draw: Draw) -> None:
     """Numbers some steps apart in (pixel, sample, dimension, seed) are independent and uncorrelated."""
     p_values = independence(draw, COUNT)

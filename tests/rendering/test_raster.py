@@ -224,6 +224,7 @@ BELL = replace(everything(), render=replace(everything().render, filter="blackma
 PLANTED = planted(painted(BELL))
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("scene, lanes", [(PLANTED, 8), *others((BELL, 1))], ids=["planted, 8", "wide filter, 1"])
 def test_pictures_are_those_of_local(device: Device, scene: Scene, lanes: int) -> None:
     """They agree sample by sample except at edges; mirrors, glass, alpha masks, textures and shadows use the first
@@ -235,6 +236,7 @@ def test_pictures_are_those_of_local(device: Device, scene: Scene, lanes: int) -
     assert differing(one, other) < 0.01 and one.std() > 0.1
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("integrator", ["raster", "local"])
 def test_without_shadows_all_that_faces_a_light_is_lit(device: Device, integrator: Any) -> None:
     """A sphere between a sun overhead and the ground: without shadows color·(sky + sun) everywhere; with them

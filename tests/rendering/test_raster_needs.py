@@ -25,6 +25,7 @@ from .test_raster import AHEAD, PLANTED, SETTINGS, SIZE, ball, plain
 from .test_variants import everything
 
 
+@pytest.mark.programs
 def test_several_devices_and_tiles_render_the_same_picture(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """With small buffers and the film on the host, the image is that of one session, bit for bit."""
     films = []
@@ -55,6 +56,7 @@ def test_bins_are_in_the_memory_plan(device: Device) -> None:
     assert bins.bytes == 0 and bins.of(launch, {}) and 64 * 5120 // 4 < bins.bytes < 64 * 5120 * 1.5
 
 
+@pytest.mark.programs
 def test_where_no_ray_is_followed_there_is_no_tree(device: Device) -> None:
     """The image is bit-identical to the one with a BVH; first hits of rays remain available on request."""
     balls = [Sphere(center=(-1.5, 0.0, -4.0), radius=0.7), Sphere(center=(1.5, 0.0, -4.0), radius=0.7)]

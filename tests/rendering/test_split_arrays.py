@@ -54,6 +54,7 @@ def whole_depth(device: Device) -> tuple[Renderer, bytes]:
 LIMITS = [("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8), ("packs", 12)]
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(("layout", "limit"), [("bvh8", 8), *others(*LIMITS)])
 def test_in_parts_it_is_the_same_picture(
     device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch, layout: LayoutName, limit: int
@@ -88,6 +89,7 @@ def assert_same_in_parts(
     return running
 
 
+@pytest.mark.programs
 def test_only_the_film_is_too_large(
     device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -122,6 +122,7 @@ def test_pictures_are_moved_scaled_and_turned(device: Device, degrees: float, or
     assert np.abs(found - expected).max() < 1e-5
 
 
+@pytest.mark.programs
 def test_second_set_of_coordinates_and_numbers(device: Device) -> None:
     """One material with a color from the first UV set and a metallic texture from the second."""
     color, metal = picture(8, 4, 4), Picture(np.zeros((1, 2, 4), np.uint8))
@@ -232,6 +233,7 @@ def test_normal_maps_tilt_along_the_picture_on_spheres(device: Device, placed: s
     np.testing.assert_allclose(last.film.mean.mean(axis=(0, 1)), bent / np.linalg.norm(bent), atol=2e-4)
 
 
+@pytest.mark.programs
 def test_normal_maps_on_spheres(device: Device) -> None:
     """A normal map that bends nothing leaves the image unchanged."""
     flat = Texture(picture=plain(128, 128, 255), factor=0.0)

@@ -52,6 +52,7 @@ def test_hits_are_those_of_all_triangles(device: Device, order: tuple[int, ...],
     assert np.array_equal(blocked, beyond) and 0.2 < blocked.mean() < 0.8
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("layout", TREES)
 def test_length_of_directions_changes_only_t(device: Device, layout: str) -> None:
     """Rays that start on or just above a floor and leave it, scaled by powers of two, so that all digits are

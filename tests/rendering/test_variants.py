@@ -151,6 +151,7 @@ def reference(device: Device) -> Doubles:
     return film(device, everything(), lanes=8, layout="bvh8").mean
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("layout, lanes", WAYS + others(*(way for way in product(TREES, LANES) if way not in WAYS)))
 def test_lanes_and_layouts_agree(device: Device, reference: Doubles, layout: str, lanes: int) -> None:
     """They agree to float rounding: a sample is a chain of some hundred operations, so most pixels agree to 1e-5.
@@ -174,6 +175,7 @@ def assert_most_agree(picture: Doubles, reference: Doubles) -> None:
     assert np.mean(differs) < 1e-3, np.argwhere(differs)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("lanes, layout", [(1, "bvh8"), *others((16, "cwbvh"))])
 def test_lanes_agree_on_textures_and_holes(device: Device, lanes: int, layout: str) -> None:
     """As above; textures add edges at which samples can differ."""
@@ -184,6 +186,7 @@ def test_lanes_agree_on_textures_and_holes(device: Device, lanes: int, layout: s
     assert expected.mean() > 0.1 and np.mean(differs) < 4e-3, np.argwhere(differs)
 
 
+@pytest.mark.programs
 def test_spheres_in_the_tree_and_out_of_it_agree(
     device: Device, reference: Doubles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -194,6 +197,7 @@ def test_spheres_in_the_tree_and_out_of_it_agree(
     assert_most_agree(film(device, everything(), layout="bvh8").mean, reference)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("sampler, lanes", [("sobol", 16), *others(("stratified", 8))])
 def test_lanes_agree_with_every_sampler(device: Device, sampler: Sampler, lanes: int) -> None:
     """As above, for a smaller scene."""
@@ -294,6 +298,7 @@ def test_of_each_test_one_is_compiled(device: Device, kind: str, known: dict[str
         assert set(default.files) ^ set(chosen.files) <= {*known.values(), "geometry/plain_ray.cl"}
 
 
+@pytest.mark.programs
 def test_other_tests_make_much_the_same_picture(device: Device, reference: Doubles) -> None:
     """Ray origins and hits differ slightly, so few samples are bit-identical, but the image is the same."""
     picture = film(device, everything(), triangle="baldwin_weber", box="plain", sphere="textbook", offset="ulp").mean

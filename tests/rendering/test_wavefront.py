@@ -66,6 +66,7 @@ def test_waves_are_the_same_paths(device: Device, name: str) -> None:
     assert_same(waves, lanes)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(
     "chosen", [{"sampler": "sobol", "layout": "bvh8"}, {"sampler": "stratified", "direct_light": True}], ids=str
 )

@@ -22,6 +22,7 @@ def entries(base: float, film: float, fibres: float) -> Doubles:
     return np.array(tables((base,), (film,), (fibres,))).reshape(-1, ENTRY)
 
 
+@pytest.mark.statistics
 @pytest.mark.parametrize("base", [0.1, 0.3, 0.7, 1.0])
 @pytest.mark.parametrize("film, fibres", [(0.0, 0.15), (0.3, 0.3), (0.8, 1.0)])
 def test_what_layers_take_from_gloss(base: float, film: float, fibres: float) -> None:

@@ -14,6 +14,7 @@ from .driver import Driver, at, changed, drive, halves
 from .scenes import SKY, two_balls
 
 
+@pytest.mark.programs
 def test_a_sphere_is_edited(tmp_path: Path) -> None:
     def test(window: Driver) -> None:
         window.rest()

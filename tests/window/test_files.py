@@ -17,6 +17,7 @@ from .driver import Driver, drive
 from .scenes import two_balls
 
 
+@pytest.mark.programs
 def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The saved image of an edited scene equals, bit for bit, that of `clrt render` for the saved scene at the same
     number of samples."""
@@ -64,6 +65,7 @@ def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert read_texels(tmp_path / "window.png").shape == (800, 1280, 4)
 
 
+@pytest.mark.programs
 def test_another_scene_is_opened(tmp_path: Path) -> None:
     (tmp_path / "blue.toml").write_text("""
         [render]\nsize = [160, 120]\nspp = 2\nintegrator = "albedo"

@@ -19,6 +19,7 @@ from .driver import Driver, at, changed, drive, halves
 from .scenes import SKY, two_balls
 
 
+@pytest.mark.programs
 def test_a_material_gets_a_preset(tmp_path: Path) -> None:
     def test(window: Driver) -> None:
         window.rest()
@@ -45,6 +46,7 @@ def test_a_material_gets_a_preset(tmp_path: Path) -> None:
     drive(two_balls(), test, tmp_path)
 
 
+@pytest.mark.programs
 def test_every_parameter_can_be_edited(tmp_path: Path) -> None:
     """The panel has a widget named after each field of each material type."""
 
@@ -65,6 +67,7 @@ def test_every_parameter_can_be_edited(tmp_path: Path) -> None:
     drive(two_balls(integrator="normals", spp=1), test, tmp_path)
 
 
+@pytest.mark.programs
 def test_what_need_not_be_given(tmp_path: Path) -> None:
     """Values that belong together are set and removed together, starting from the preset; textures have own fields."""
 

@@ -16,6 +16,7 @@ from .driver import Driver, at, changed, drive, halves
 from .scenes import SKY, two_balls
 
 
+@pytest.mark.programs
 def test_integrators_are_switched(tmp_path: Path) -> None:
     def test(window: Driver) -> None:
         window.rest()
@@ -55,6 +56,7 @@ def test_integrators_are_switched(tmp_path: Path) -> None:
     drive(two_balls(), test, tmp_path)
 
 
+@pytest.mark.programs
 def test_devices_are_switched(tmp_path: Path) -> None:
     program = f"import sys; sys.path.append('.'); from tests.window.two_devices import main; main({str(tmp_path)!r})"
     done = subprocess.run(
