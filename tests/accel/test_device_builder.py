@@ -104,6 +104,7 @@ def test_the_same_tree_again_and_everywhere(device: Device, layout: str, case: s
         assert first_result(layout, case)[-1] == first_result(layout, case)[0]
 
 
+@pytest.mark.programs
 @covering("case, layout", ["blocks", "mixed", "two", "equal_centroids"], SHAPES)
 def test_the_same_tree_by_many_work_items(device: Device, layout: str, case: str) -> None:
     found = build_tree(like_gpu(device), layout, "ploc", *SCENES[case])

@@ -25,6 +25,8 @@ from ..covering import others
 from ..rendering.pictures import quad
 from ..rendering.test_variants import everything, planted
 
+pytestmark = pytest.mark.programs
+
 WHITE, BLACK = Diffuse(color=(0.8, 0.8, 0.8)), Diffuse(color=(0.0, 0.0, 0.0))
 POINT = PointLight(position=(0.0, 4.0, 0.0), intensity=(5.0, 5.0, 5.0))
 SETTINGS = RenderSettings(size=(8, 8), spp=16, max_depth=4)
@@ -98,7 +100,6 @@ REASONS: dict[str, tuple[Scene, str]] = {
 FURTHER = ["roof behind a veil", "wound backwards", "absorbed", "mirror"]
 
 
-@pytest.mark.programs
 @pytest.mark.parametrize("name", [*(name for name in REASONS if name not in FURTHER), *others(*FURTHER)])
 def test_why_it_is_black(device: Device, name: str) -> None:
     scene, reason = REASONS[name]

@@ -29,6 +29,8 @@ from ..covering import others
 from ..rendering.lamps import lamps
 from ..rendering.test_variants import everything, painted, planted, shelf
 
+pytestmark = pytest.mark.programs
+
 SCENES = Path(__file__).parents[2] / "scenes"
 SIZE, SPP = (32, 24), 8
 Doubles = NDArray[np.float64]
@@ -77,7 +79,6 @@ def traced(request: pytest.FixtureRequest, device: Device) -> tuple[Doubles, lis
     return state.film.mean, paths
 
 
-@pytest.mark.programs
 def test_contributions_add_up_to_the_pixel(traced: tuple[Doubles, list[PixelPaths]]) -> None:
     """To float rounding, unless it flipped a decision: of about 100 samples of 100 decisions each, one may be
     flipped."""
@@ -106,7 +107,6 @@ def test_vertices_follow_from_each_other(traced: tuple[Doubles, list[PixelPaths]
         assert not rows["direct"][~asked].any()
 
 
-@pytest.mark.programs
 def test_light_samples_are_their_factors(device: Device) -> None:
     """Without media: throughput, BSDF, radiance and MIS weight over the pdf (Veach 1997, eq. 9.15)."""
     scene = everything()
@@ -157,7 +157,6 @@ def test_samples_that_are_not_finite_are_dropped(device: Device) -> None:
     assert not paths.kept.any() and not paths.value.any()
 
 
-@pytest.mark.programs
 def test_paths_that_were_ended_are_missed(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """For drivers that end loops early (test_loop_limit.py)."""
     folder = sabotaged(tmp_path / "kernels", r"!loops_ended\(launch.width\)", "(launch.width == 0)")

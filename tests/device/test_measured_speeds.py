@@ -47,6 +47,7 @@ def test_whatever_the_file_holds(info: DeviceInfo, tmp_path: Path, bench: object
     assert kept_speed(info) is None
 
 
+@pytest.mark.programs
 @pytest.mark.needs("gcc")
 def test_measuring(tmp_path: Path) -> None:
     """The best device is measured and then ranked by its speed; one that cannot compute gives exit code 4."""

@@ -157,6 +157,7 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     assert sorted(used) == FILES
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(
     "entry", ["the picture's", *others("aov/denoiser_guides.cl", "first hits", "integrator/debug.cl")]
 )

@@ -83,6 +83,7 @@ def test_the_error_is_less_than_an_eighth(image: clrt.Image, converged: Floats) 
     assert relmse(image.pixels, converged) < relmse(image.raw, converged) / 8  # type: ignore[operator]
 
 
+@pytest.mark.programs
 def test_the_raw_picture_is_kept(image: clrt.Image) -> None:
     """The raw image equals the one rendered without denoising, bit for bit."""
     plain = clrt.render(scene(), spp=8)

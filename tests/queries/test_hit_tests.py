@@ -49,6 +49,7 @@ def aimed_rays() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 ORIGINS, DIRECTIONS = aimed_rays()
 
 
+@pytest.mark.programs
 @covering("triangle, layout", VARIANTS, ["bvh8", "bvh2", "cwbvh"])
 def test_hits_are_those_of_float64_away_from_edges(device: Device, triangle: str, layout: str) -> None:
     """Every layout agrees with float64 away from edges, and bit for bit with brute force.
@@ -103,6 +104,7 @@ def test_records_are_what_the_papers_say(layout: str, triangle: str) -> None:
             np.testing.assert_array_equal(rows[field], exact.astype(np.float32))
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("layout, triangle", list(zip(["bvh8", "cwbvh"], FORMS)))
 def test_instances_are_hit_by_every_test_alike(device: Device, layout: str, triangle: str) -> None:
     """Away from edges, all tests agree within rounding, also after the instances move."""
@@ -134,6 +136,7 @@ def test_moved_vertices_get_new_records(device: Device, triangle: str) -> None:
     np.testing.assert_array_equal(query.closest_hit(ORIGINS, DIRECTIONS), new.closest_hit(ORIGINS, DIRECTIONS))
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(
     "layout, traversal", [("bvh8", "single"), ("cwbvh", None), *others(("bvh8", "pool"), ("bvh2", None))]
 )

@@ -98,6 +98,7 @@ def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, way: 
     np.testing.assert_array_equal(query.any_hit(origins, directions)[clear], hit[clear])
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("lanes, ways", [(1, WAYS[::3]), (8, WAYS)])
 def test_layouts_agree_to_the_last_bit(
     device: Device, lanes: int, ways: tuple[tuple[str, str | None], ...], monkeypatch: pytest.MonkeyPatch

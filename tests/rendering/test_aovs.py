@@ -250,6 +250,7 @@ def test_light_needs_an_integrator_of_light() -> None:
         clrt.render(everything(), aovs="indirect", integrator="normals")
 
 
+@pytest.mark.programs
 def test_light_of_two_edges_is_all_direct() -> None:
     for options in ({"integrator": "direct"}, {"max_depth": 1}):
         pixels, found = rendered(everything(), "direct,indirect", **options)

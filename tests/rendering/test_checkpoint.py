@@ -26,6 +26,7 @@ def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("clrt.device.launches.launch.TARGET_SECONDS", 1e-9)
 
 
+@pytest.mark.programs
 @covering("stops, adaptive", [{"spp": 40}, {"error": 0.1}], [False, True])
 def test_interrupted_again_and_again(
     device: Device, tmp_path: Path, small_launches: None, adaptive: bool, stops: dict[str, float]

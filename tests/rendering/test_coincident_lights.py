@@ -14,6 +14,8 @@ from clrt.scene.render_settings import Integrator
 
 from .pictures import film
 
+pytestmark = pytest.mark.programs
+
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 BLACK = (0.0, 0.0, 0.0)
 INTEGRATORS: tuple[Integrator, ...] = ("path", "local")
@@ -50,7 +52,6 @@ def test_a_copy_in_the_same_place_adds_nothing(device: Device, integrator: Integ
     assert received(device, integrator, [flat] * 3, [ball] * 2) == pytest.approx(once, rel=1e-5)
 
 
-@pytest.mark.programs
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_coincident_half_transparent_emitters(device: Device, integrator: Integrator) -> None:
     """n of them in one place emit 1 − 2⁻ⁿ of what an opaque one does, as seen by rays that cross them in order."""

@@ -108,6 +108,7 @@ def test_normals_of_a_sphere(device: Device) -> None:
     np.testing.assert_allclose(found["albedo"][covered], colors, rtol=1024 * 2**-24)
 
 
+@pytest.mark.programs
 def test_normals_face_the_camera(device: Device) -> None:
     """Also those of a wall that is seen from behind, and of one with tilted shading normals."""
     everywhere(guides(device, Scene(meshes=[back(Diffuse())], camera=INSIDE, render=FLAT))["normal"], (0, 0, 1))

@@ -172,6 +172,7 @@ def test_instances_look_like_meshes_after_many_bounces(device: Device) -> None:
     assert mean_test(difference, np.mean(variance, axis=(0, 1)), count.size, 0.0).min() > 1e-3
 
 
+@pytest.mark.programs
 @covering("layout, lanes, spheres", ["bvh2", "cwbvh"], [8, 1], [40, 2])
 def test_lanes_and_layouts_agree(device: Device, layout: str, lanes: int, spheres: int) -> None:
     """Layouts trace the same rays and give bit-identical images; SIMD widths agree to float rounding.
@@ -190,6 +191,7 @@ def test_whatever_else_is_in_the_scene(device: Device, rest: str) -> None:
     assert (np.abs(picture - expected).max(axis=2) > 1e-4).mean() < 0.005
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("mesh_size, world_size", [(2.0**-66, 1.0), (2.0**50, 1.0), (1.0, 2.0**-66), (1.0, 2.0**50)])
 def test_sizes_do_not_matter(device: Device, mesh_size: float, world_size: float) -> None:
     """Scaling meshes or the world by powers of two leaves the image bit-identical."""
@@ -236,6 +238,7 @@ def test_lamps_become_meshes(device: Device) -> None:
     assert (np.abs(picture - expected).max(axis=2) > 1e-4).mean() < 0.01 and expected.max() > 1
 
 
+@pytest.mark.programs
 def test_ten_thousand_instances_need_the_memory_of_one(device: Device) -> None:
     """A mesh's triangles and BVH are stored once; an instance adds two records and its part of the top-level BVH."""
     mesh = ball()

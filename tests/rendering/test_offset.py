@@ -89,6 +89,7 @@ def plane_departures(device: Device, offset: str, shift: float, size: float) -> 
     return departures(probe, scale * origin, direction, leaving(side, 2)), side, scale
 
 
+@pytest.mark.programs
 @covering("offset, shift", ["fixed", "ulp", "bound"], OFFSETS[::-1])
 def test_far_away_a_fixed_distance_is_not_enough(device: Device, offset: str, shift: float) -> None:
     """At 10^6 an ulp is 0.06: with an offset of a thousandth many rays hit the plane that they leave."""

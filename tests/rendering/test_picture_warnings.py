@@ -71,6 +71,7 @@ def test_a_black_picture_says_why(
     assert said(device, caplog, scene, integrator="depth") == []
 
 
+@pytest.mark.programs
 def test_a_lamp_that_is_wound_backwards(device: Device, caplog: pytest.LogCaptureFixture) -> None:
     """It is reported before the render, and as the cause of the black image."""
     scene = replace(BALL, lights=[], meshes=[UPWARDS])

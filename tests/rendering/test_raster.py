@@ -275,6 +275,7 @@ def test_mirrors_end_with_the_depth(device: Device) -> None:
     assert not shallow.any() and np.allclose(deep, 0.5 * 0.6 * 0.7, rtol=1e-5)
 
 
+@pytest.mark.programs
 def test_it_follows_a_camera_that_moves(device: Device) -> None:
     scene = replace(PLANTED, render=replace(PLANTED.render, integrator="raster", max_depth=2))
     moved = replace(scene, camera=Camera(position=(2.0, 1.0, 5.0), look_at=(0.0, 1.0, 0.0)))

@@ -26,6 +26,8 @@ from ..covering import others
 from .rays import icosphere
 from .test_variants import everything, painted
 
+pytestmark = pytest.mark.programs
+
 
 def scene() -> Scene:
     """Return a scene with textures and enough spheres that they are stored in the BVH."""
@@ -54,7 +56,6 @@ def whole_depth(device: Device) -> tuple[Renderer, bytes]:
 LIMITS = [("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8), ("packs", 12)]
 
 
-@pytest.mark.programs
 @pytest.mark.parametrize(("layout", "limit"), [("bvh8", 8), *others(*LIMITS)])
 def test_in_parts_it_is_the_same_picture(
     device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch, layout: LayoutName, limit: int
@@ -89,7 +90,6 @@ def assert_same_in_parts(
     return running
 
 
-@pytest.mark.programs
 def test_only_the_film_is_too_large(
     device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -162,6 +162,7 @@ def test_lanes_and_layouts_agree(device: Device, reference: Doubles, layout: str
     assert_most_agree(film(device, everything(), lanes=lanes, layout=layout).mean, reference)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(
     "chosen", [{"layout": None, "tree": False}, {"layout": "bvh8", "builder": "midpoint"}], ids=str
 )

@@ -58,6 +58,7 @@ def assert_same(waves: Film, lanes: Film) -> None:
     assert np.mean(one != other) < 0.1 and one.sum() == pytest.approx(other.sum(), rel=1e-4)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("name", [*SCENES, *others(*OTHERS)])
 def test_waves_are_the_same_paths(device: Device, name: str) -> None:
     scene = (SCENES | OTHERS)[name]

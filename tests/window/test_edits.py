@@ -44,6 +44,7 @@ def test_a_sphere_is_edited(tmp_path: Path) -> None:
     drive(two_balls(), test, tmp_path)
 
 
+@pytest.mark.programs
 def test_the_light_moves(tmp_path: Path) -> None:
     def test(window: Driver) -> None:
         window.rest()
