@@ -16,6 +16,8 @@ from .option_types import OneOf, Size
 
 if TYPE_CHECKING:
     from ..bench.convergence.converge import Effort
+    from ..bench.convergence.reference import Reference
+    from ..scene.model import Scene
     from ..scene.render_settings import Integrator
 
 #: The configurations of contestants.py, where the names start with "clrt, ".
@@ -103,36 +105,16 @@ def converge_command(
     --spp to test for bias).
     """
     from ..bench.convergence.calibration import calibrations
-    from ..bench.convergence.contestants import CHOICES, MORE_CHOICES
     from ..bench.convergence.converge import measure_convergence
-    from ..bench.convergence.reference import Reference
     from ..bench.numerics.plots import plot_convergence
     from ..device.discovery.discover import choose
-    from ..formats.load_scene import load
     from .converge_tables import calibration_lines, scene_lines
-    from .render_job import read_reference
 
     devices = [choose(selector)[0] for selector in selectors or (None,)]
     named = [f"device {device.index}: {device.name} ({device.platform}, {device.driver})" for device in devices]
     click.echo("\n".join(named))
-    loaded = [load(scene) for scene in scenes]
-    if size is not None:
-        loaded = [replace(scene, render=replace(scene.render, size=size)) for scene in loaded]
-    if integrators:
-        loaded = [
-            replace(scene, name=f"{scene.name}, {name}", render=replace(scene.render, integrator=name))
-            for scene in loaded
-            for name in integrators
-        ]
-    given = None
-    if reference is not None:
-        if len(loaded) > 1 or asked["reference_spp"]:
-            raise UsageError(
-                f"{reference}: is the reference of one image; name one SCENE, at most one --integrator, "
-                "and leave out --reference-spp"
-            )
-        given = Reference.exact(read_reference(reference, loaded[0].render.size))
-    chosen = [name if name == "clrt" else f"clrt, {name}" for name in names] or list(CHOICES)
+    loaded = _scenes(scenes, size, integrators)
+    given = None if reference is None else _reference(reference, loaded, asked["reference_spp"])
     results = []
     for result in measure_convergence(
         loaded,
@@ -140,7 +122,7 @@ def converge_command(
         _effort(**asked),
         peers=peers,
         given=given,
-        choices={name: (CHOICES | MORE_CHOICES)[name] for name in chosen},
+        choices=_choices(names),
         say=partial(click.echo, err=True),
     ):
         click.echo("\n".join(scene_lines(result, all(device.type == "cpu" for device in devices))) + "\n")
@@ -151,6 +133,43 @@ def converge_command(
     write_figures(json_file, {"quick": asked["quick"], "scenes": results, "calibration": told})
     if plot is not None:
         click.echo(str(plot_convergence(plot, results, named)))
+
+
+def _scenes(files: tuple[Path, ...], size: tuple[int, int] | None, integrators: tuple[Integrator, ...]) -> list[Scene]:
+    """The scenes of the files, each with every integrator if any are named."""
+    from ..formats.load_scene import load
+
+    loaded = [load(file) for file in files]
+    if size is not None:
+        loaded = [replace(scene, render=replace(scene.render, size=size)) for scene in loaded]
+    if not integrators:
+        return loaded
+    return [
+        replace(scene, name=f"{scene.name}, {name}", render=replace(scene.render, integrator=name))
+        for scene in loaded
+        for name in integrators
+    ]
+
+
+def _reference(file: Path, scenes: list[Scene], spp: int | None) -> Reference:
+    """The image of a file as the reference of the one scene."""
+    from ..bench.convergence.reference import Reference
+    from .render_job import read_reference
+
+    if len(scenes) > 1 or spp:
+        raise UsageError(
+            f"{file}: is the reference of one image; name one SCENE, at most one --integrator, "
+            "and leave out --reference-spp"
+        )
+    return Reference.exact(read_reference(file, scenes[0].render.size))
+
+
+def _choices(names: tuple[str, ...]) -> dict[str, dict[str, Any]]:
+    """The configurations of these names, by the contestants' names."""
+    from ..bench.convergence.contestants import CHOICES, MORE_CHOICES
+
+    chosen = [name if name == "clrt" else f"clrt, {name}" for name in names] or list(CHOICES)
+    return {name: (CHOICES | MORE_CHOICES)[name] for name in chosen}
 
 
 def _effort(
