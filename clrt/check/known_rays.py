@@ -21,7 +21,7 @@ ROUNDINGS = 30.0
 
 
 def check_rays(device: Device, findings: Findings) -> None:
-    """Check the device's own layout with coherent and shuffled rays, which take different paths (tree_query.py)."""
+    """Check the device's own layout with coherent and shuffled rays, which are traversed in different orders."""
     star = _star(device)
     query, inside = _query(device, star), _rays(device, star)
     for rays in (inside, _shuffled(inside), rays_from_elsewhere(star, share(device, ELSEWHERE, FEW_RAYS))):

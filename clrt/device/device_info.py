@@ -14,7 +14,7 @@ class Verdict:
     """The result of a device check. failures: one sentence each, empty if it passed. figures: measurements by name.
 
     when: the time of the check in UTC (ISO 8601); seconds: its duration. kernels: digest of the kernels that were
-    checked (sources.py).
+    checked (kernel_files.py).
     """
 
     passed: bool

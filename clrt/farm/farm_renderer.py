@@ -28,7 +28,7 @@ FARM = "a farm"
 class FarmRenderer(Renderer):
     """Renderer of a scene on a cluster. It is used like `Renderer`; `device` selects among each worker's devices.
 
-    simulated: samples per second of workers that only sleep, to measure the overhead (simulated.py).
+    simulated: samples per second of workers that only sleep, to measure the overhead (simulated_workers.py).
     """
 
     def __init__(

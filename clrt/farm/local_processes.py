@@ -51,7 +51,7 @@ class Processes:
             )
 
     def add_simulated(self, count: int) -> None:
-        """Start a process with `count` simulated workers (simulated.py)."""
+        """Start a process with `count` simulated workers (simulated_workers.py)."""
         self.workers.append(self._start("clrt.farm.simulated_workers", self.address, str(count)))
 
     def kill(self, process: subprocess.Popen[bytes]) -> None:

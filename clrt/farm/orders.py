@@ -1,4 +1,4 @@
-"""Work orders sent to workers, with their scene. Plain data only: see parcels.py."""
+"""Work orders sent to workers, with their scene. Plain data only: see serialization.py."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ a separate process: `python -m tests.trials.launches SCENE DEVICE` prints its fi
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ from .renders import GALLERY
 #: Samples per pixel and seconds, whichever comes first.
 SPP, SECONDS = 32, 20.0
 #: The kernels that render images.
-INTEGRATORS = ("wave", "integrate", "raster")
+INTEGRATORS = ("megakernel", "wavefront", "raster")
 #: Limit in seconds for a launch on a CPU.
 LIMIT = 0.2
 
@@ -61,7 +62,7 @@ def measured(scene: str, device: str) -> dict[str, Any]:
 
     def noted(queue: Any, kernel: Any, *arguments: Any, **options: Any) -> cl.Event:
         event = enqueue(queue, kernel, *arguments, **options)
-        launched.append((kernel.function_name, event))
+        launched.append((re.sub(r"_[0-9a-f]{32}$", "", kernel.function_name), event))
         return event
 
     cl.enqueue_nd_range_kernel = noted

@@ -1,4 +1,4 @@
-"""Scenes of github.com/mitsuba-renderer/mitsuba-data against their references, as in Mitsuba's own test_renders.py.
+"""Scenes of github.com/mitsuba-renderer/mitsuba-data against their references, as in Mitsuba's own tests.
 
 Each reference is a mean over REFERENCE_SPP samples, with the variance of a single one for every pixel. An image of
 BUDGET samples passes Mitsuba's test if at most 1 − ACCEPTED of its pixels and channels deviate more than chance allows

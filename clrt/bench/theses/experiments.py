@@ -2,7 +2,7 @@
 
 N: Nadolny, "Ray Tracing w czasie rzeczywistym", Toruń 2026, tables 5.1 and 5.2. S: Suchiński, "Implementation of the
 Ray Tracing algorithm in Vulkan technology", Łódź 2022, 7.5. Their scenes are not available; these are similar (see
-theses_scenes.py). A frame is the device's work, from the first launch to the end of the last; nothing is displayed.
+thesis_scenes.py). A frame is the device's work, from the first launch to the end of the last; nothing is displayed.
 """
 
 from __future__ import annotations

@@ -69,8 +69,8 @@ def on_device(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
 def lent(device: Device, array: NDArray[Any] | DeviceArray, writable: bool = False) -> cl.Buffer:
     """Return a buffer to read from, or also to write to if `writable`.
 
-    On a CPU it wraps the numpy array itself without a copy (see lending.py), which must then not change; elsewhere it
-    is that of `on_device`.
+    On a CPU it wraps the numpy array itself without a copy (see lent_memory.py), which must then not change; elsewhere
+    it is that of `on_device`.
     """
     if isinstance(array, DeviceArray) or device.info.type != "cpu" or not array.flags.c_contiguous:
         return on_device(device, array)

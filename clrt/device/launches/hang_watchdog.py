@@ -72,7 +72,7 @@ def take_any_time() -> None:
 
 @contextmanager
 def warming_up() -> Iterator[None]:
-    """Mark the first launch of a program, whose calls are not watched: see background.py."""
+    """Mark the first launch of a program, whose calls are not watched: see background_compile.py."""
     _counts[WARMING] += 1
     try:
         yield

@@ -1,7 +1,8 @@
 """From kernel files to a built program: composition, build, cache.
 
-A program's text is a preamble (records, choices, features) followed by whole kernel files. `#include "file.cl"` is
-resolved here, each file once, and `#include NAME` stands for the files that the scene selects for NAME, possibly none.
+A program's text is a preamble (records, choices, features) followed by whole kernel files. Names in quotation marks
+after #include are resolved here, each file once, and `#include NAME` stands for the files that the scene selects for
+NAME, possibly none.
 So the text has exactly what the scene needs. `--print-kernel` shows what is compiled, except for the suffix of kernel
 names (bitcode.py). The known problems of -I (spaces in paths, driver caches that ignore included files) cannot occur.
 """
@@ -91,7 +92,7 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
 
     PoCL caches compiled kernels itself; clrt's cache then holds bitcode, or an empty entry to record that a program was
     built. If the device has no fma instruction, kernels/core/fma.cl is prepended. data_bytes: approximate size of the
-    program's data; for large data PoCL's front end runs in the compile process (aside.py).
+    program's data; for large data PoCL's front end runs in the compile process (compile_process.py).
     """
     start = time.perf_counter()
     source = _whole(device, source)
