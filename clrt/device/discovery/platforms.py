@@ -1,7 +1,7 @@
 """The platforms of all drivers that can be loaded, and the faults of the others.
 
-A driver is probed (driver_probe.py) before this process loads it. The result is cached on disk for the driver's current files:
-success until one of them or the machine changes, a fault for an hour.
+A driver is probed (driver_probe.py) before this process loads it. The result is cached on disk for the driver's current
+files: success until one of them or the machine changes, a fault for an hour.
 """
 
 from __future__ import annotations

@@ -31,9 +31,9 @@ class NoiseEstimate:
     that is (r − 1)·V(2n). r is measured from the last such difference and the one three doublings before, over all
     tiles that have both, relative to the samples' variance at these times, which falls by 2: the expected pixel values,
     which divide both, were not known equally well then. As convergence always slows down, towards r = 2, r is 2 times a
-    power of the measured excess, reduced as far as the tiles disagree (James and Stein 1961, as in expected_radiance.py). Blocks
-    of 2^k samples, assumed to be independent, give V between powers of two. The estimate never exceeds that from the
-    samples' variance (Film.noise).
+    power of the measured excess, reduced as far as the tiles disagree (James and Stein 1961, as in
+    expected_radiance.py). Blocks of 2^k samples, assumed to be independent, give V between powers of two. The estimate
+    never exceeds that from the samples' variance (Film.noise).
 
     planned_spp: where the sampler starts afresh; r is 2 from there on.
     """
