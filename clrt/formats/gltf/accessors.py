@@ -16,7 +16,7 @@ from ...errors import SceneError
 from ..referenced_files import note_read
 from .schema import Accessor, Document, Sparse, entry, parse_document
 
-COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 #: An accessor without a buffer view is all zeros; one larger than this is rejected as malformed.
 MOST_ZEROS = 2**24

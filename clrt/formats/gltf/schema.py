@@ -165,6 +165,11 @@ class Node(Part):
     extensions: NodeExtensions = NodeExtensions()
 
 
+class Skin(Part):
+    joints: Annotated[list[Index], Field(min_length=1)]
+    inverseBindMatrices: Index | None = None
+
+
 class Scene(Part):
     nodes: list[Index] = []
 
@@ -186,6 +191,7 @@ class Document(Part):
     scene: Index | None = None
     samplers: list[Sampler] = []
     scenes: list[Scene] = []
+    skins: list[Skin] = []
     textures: list[Texture] = []
     extensions: DocumentExtensions = DocumentExtensions()
 
