@@ -93,7 +93,7 @@ class GltfData:
             values = np.zeros((accessor.count, size), DTYPES[accessor.componentType])
         if accessor.sparse is not None:
             values = self._replaced(values, accessor.sparse, accessor, f"accessor {index}")
-        return _normalised(values) if accessor.normalized else values
+        return normalised(values) if accessor.normalized else values
 
     def _strided(
         self, view: int, offset: int, component: int, shape: tuple[int, int], stride: int | None, user: str
@@ -174,7 +174,7 @@ def split_glb(content: bytes) -> tuple[bytes, bytes | None]:
     return chunks[b"JSON"], chunks.get(b"BIN\0")
 
 
-def _normalised(values: Array) -> Array:
+def normalised(values: Array) -> Array:
     """Convert integers to floats: unsigned 0 … 1, signed −1 … 1 (specification 3.6.2.2)."""
     if not np.issubdtype(values.dtype, np.integer):
         return values

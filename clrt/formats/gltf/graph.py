@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -17,22 +17,22 @@ Placed = tuple[gltf.Node, Matrix]
 class NodeGraph:
     """Nodes of one of the document's scenes: `placed`, in depth-first order, each with its matrix to the world.
 
-    Without nodes each mesh gets the identity. scene: its index; None for the default one.
+    Without nodes each mesh gets the identity. nodes: the document's, as posed; scene: its index; None for the default.
     """
 
-    def __init__(self, document: gltf.Document, scene: int | None = None) -> None:
-        self._nodes = document.nodes
+    def __init__(self, document: gltf.Document, nodes: Sequence[gltf.Node], scene: int | None = None) -> None:
+        self._nodes = nodes
         self._worlds: dict[int, Matrix] = {}
         self.placed: list[Placed] = list(self._shown(document, document.scene or 0 if scene is None else scene))
 
     def _shown(self, document: gltf.Document, scene: int) -> Iterator[Placed]:
-        if not document.nodes:
+        if not self._nodes:
             yield from ((gltf.Node(mesh=index), np.eye(4)) for index in range(len(document.meshes)))
         elif document.scenes:
             yield from self._below(gltf.entry(document.scenes, scene, "scene", "the file").nodes)
         else:
-            children = {child for node in document.nodes for child in node.children}
-            yield from self._below([index for index in range(len(document.nodes)) if index not in children])
+            children = {child for node in self._nodes for child in node.children}
+            yield from self._below([index for index in range(len(self._nodes)) if index not in children])
 
     def _below(self, roots: list[int]) -> Iterator[Placed]:
         waiting = [(index, np.eye(4)) for index in reversed(roots)]

@@ -35,7 +35,7 @@ class Materials:
 
     def __init__(self, data: GltfData) -> None:
         self._data = data
-        self.names = gltf.material_names(data.document)
+        self.names = gltf.unique_names("material", [material.name for material in data.document.materials])
         self._pictures: dict[int, Picture | None] = {}
         #: Features that had an effect in the file, but are not rendered, by the material's name.
         self.unused: dict[str, list[str]] = {}

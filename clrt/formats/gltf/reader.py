@@ -6,20 +6,26 @@ Unsupported features (lines, unknown extensions, ...) are listed in one logged w
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import SceneError
+from ...scene.animation import ModelAnimation
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals
 from ...scene.geometry.transform import Matrix
 from ...scene.model import Mesh, Model
 from ...scene.validation.validate import mesh_problems
 from ..frame_model import bounds
+from ..model_choice import DEFAULT, ModelChoice, chosen
 from . import schema as gltf
 from .accessors import GltfData
+from .animations import Clip, animation_names
 from .cameras import read_cameras
 from .graph import NodeGraph
 from .instancing import matrices, shown
@@ -34,71 +40,116 @@ log = logging.getLogger(__name__)
 Shape = tuple[int, int, tuple[float, ...]]
 
 
-def read_gltf(path: Path, normals: Normals = "file") -> Model:
+def read_gltf(path: Path, normals: Normals = "file", choice: ModelChoice = DEFAULT) -> Model:
     """Read the scene of a glTF file: per primitive of each node a Mesh in world coordinates, or an Instance.
 
     Raises SceneError naming the file and the accessor, node or mesh that is wrong.
     """
+    with _named(path):
+        return GltfFile(path, normals, choice).model()
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Name the file in errors."""
     try:
-        with np.errstate(all="ignore"):  # values that are not finite are reported below
-            return _read(path, normals)
+        with np.errstate(all="ignore"):  # values that are not finite are reported
+            yield
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
 
-def _read(path: Path, normals: Normals) -> Model:
-    data = GltfData(path)
-    graph, materials = NodeGraph(data.document), Materials(data)
-    meshes, instances = shown(_places(data, Primitives(data, materials, normals), graph, {}))
-    if not meshes and not instances:
-        raise SceneError("its scene contains no triangles; export a model with triangle meshes")
-    every = [*meshes, *meshes_by_id(instances).values()]
-    problems = [problem for mesh in every for problem in mesh_problems(mesh, "mesh")]
-    if problems:
-        raise SceneError(problems)
-    _warn_of_left_out(path, data.document, materials.unused)
-    middle = np.mean(bounds(meshes, instances), axis=0)
-    return Model(
-        meshes=meshes,
-        instances=instances,
-        cameras=read_cameras(path, data.document, graph.placed, middle),
-        lights=list(read_lights(data.document, graph.placed)),
-    )
+class GltfFile:
+    """Scene of a file. Its meshes, materials and textures are read once, for all poses of its animation."""
 
+    def __init__(self, path: Path, normals: Normals, choice: ModelChoice) -> None:
+        self._path, self._choice = path, choice
+        self._data = GltfData(path)
+        self._materials = Materials(self._data)
+        self._primitives = Primitives(self._data, self._materials, normals)
+        self._shapes: dict[Shape, Mesh] = {}
+        document = self._data.document
+        self._names = {
+            "scenes": gltf.unique_names("scene", [scene.name for scene in document.scenes]),
+            "animations": animation_names(document),
+        }
+        self._scene = None if choice.scene is None else chosen(choice.scene, self._names["scenes"], "scene")
 
-def _places(
-    data: GltfData, primitives: Primitives, graph: NodeGraph, shapes: dict[Shape, Mesh]
-) -> Iterator[tuple[Mesh, Matrix]]:
-    """Yield the meshes of all nodes with their matrices; shapes: a mesh is shaped once per set of morph weights.
+    def model(self) -> Model:
+        """Return the model as chosen, with its animation, and log what is left out."""
+        clip, name, left_out = self._clip()
+        asked = clip if self._choice.animated else None
+        model, cameras = self._posed(asked, self._choice.time or 0.0)
+        self._warn([*left_out, *cameras, *(asked.ignored if asked else [])])
+        model.contents = self._names
+        if clip is not None and self._choice.time is None:
+            base = replace(model, meshes=list(model.meshes), instances=list(model.instances), lights=list(model.lights))
+            model.animation = ModelAnimation(name=name, seconds=clip.seconds, base=base, pose=partial(self._at, clip))
+        return model
 
-    A skinned mesh is in the world already, whatever its node's own transform is (specification 3.7.3.3).
-    """
-    for node, matrix in graph.placed:
-        if node.mesh is None:
-            continue
-        weights = weights_of(node, gltf.entry(data.document.meshes, node.mesh, "mesh", "a node"))
-        joints = None if node.skin is None else joint_matrices(data, graph, node.skin)
-        rigid, bent = list[Mesh](), list[Mesh]()
-        for number, stored in enumerate(primitives.of(node.mesh)):
-            if joints is not None and stored.influences is not None:
-                bent.append(primitives.shaped(stored, weights, joints))
+    def _clip(self) -> tuple[Clip | None, str, list[str]]:
+        """Return the animation, its name, and what is left out; a faulty one is rejected only if it was asked for."""
+        names = self._names["animations"]
+        if not (names or self._choice.animated):
+            return None, "", []
+        index = chosen(self._choice.animation or 0, names, "animation")
+        try:
+            return Clip(self._data, index), names[index], []
+        except SceneError as error:
+            if self._choice.animated:
+                raise
+            return None, "", [f"an animation: {error}"]
+
+    def _at(self, clip: Clip, time: float) -> Model:
+        with _named(self._path):
+            return self._posed(clip, time)[0]
+
+    def _posed(self, clip: Clip | None, time: float) -> tuple[Model, list[str]]:
+        """Return the model at a time of an animation, or without one, and descriptions of cameras that are left out."""
+        document = self._data.document
+        graph = NodeGraph(document, document.nodes if clip is None else clip.posed(document.nodes, time), self._scene)
+        places = list(self._places(graph))
+        meshes, instances = shown(places)
+        if not meshes and not instances:
+            raise SceneError("its scene contains no triangles; export a model with triangle meshes")
+        every = [*meshes, *meshes_by_id(instances).values()]
+        problems = [problem for mesh in every for problem in mesh_problems(mesh, "mesh")]
+        if problems:
+            raise SceneError(problems)
+        middle = np.mean(bounds(meshes, instances), axis=0)
+        cameras, left_out = read_cameras(document, graph.placed, middle)
+        lights = list(read_lights(document, graph.placed))
+        return Model(meshes=meshes, instances=instances, cameras=cameras, lights=lights), left_out
+
+    def _places(self, graph: NodeGraph) -> Iterator[tuple[Mesh, Matrix]]:
+        """Yield the meshes of all nodes with their matrices.
+
+        A skinned mesh is in the world already, whatever its node's own transform is (specification 3.7.3.3).
+        """
+        shapes: dict[Shape, Mesh] = {}
+        for node, matrix in graph.placed:
+            if node.mesh is None:
                 continue
-            key = node.mesh, number, weights
-            if key not in shapes:
-                shapes[key] = primitives.shaped(stored, weights)
-            rigid.append(shapes[key])
-        yield from ((mesh, place) for place in matrices(data, node, matrix) for mesh in rigid)
-        yield from ((mesh, np.eye(4)) for mesh in bent)
+            weights = weights_of(node, gltf.entry(self._data.document.meshes, node.mesh, "mesh", "a node"))
+            joints = None if node.skin is None else joint_matrices(self._data, graph, node.skin)
+            rigid, bent = list[Mesh](), list[Mesh]()
+            for number, stored in enumerate(self._primitives.of(node.mesh)):
+                if joints is not None and stored.influences is not None:
+                    bent.append(self._primitives.shaped(stored, weights, joints))
+                    continue
+                key = node.mesh, number, weights
+                shapes[key] = self._shapes.get(key) or shapes.get(key) or self._primitives.shaped(stored, weights)
+                rigid.append(shapes[key])
+            yield from ((mesh, place) for place in matrices(self._data, node, matrix) for mesh in rigid)
+            yield from ((mesh, np.eye(4)) for mesh in bent)
+        self._shapes = shapes
 
-
-def _warn_of_left_out(path: Path, document: gltf.Document, unused: Mapping[str, Sequence[str]]) -> None:
-    """Log one warning that lists what is not rendered. unused: features by material."""
-    primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
-    left_out = {
-        "points and lines": any(primitive.mode < TRIANGLES for primitive in primitives),
-    }
-    names = [name for name, present in left_out.items() if present]
-    names += sorted(f"the extension {name}" for name in set(document.extensionsUsed) - gltf.EXTENSIONS)
-    names += [f'{" and ".join(features)} of material "{name}"' for name, features in unused.items()]
-    if names:
-        log.warning("%s: left out: %s", path, ", ".join(names))
+    def _warn(self, left_out: Iterable[str]) -> None:
+        """Log one warning that lists what is not rendered."""
+        document = self._data.document
+        primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
+        names = ["points and lines"] if any(primitive.mode < TRIANGLES for primitive in primitives) else []
+        names += sorted(f"the extension {name}" for name in set(document.extensionsUsed) - gltf.EXTENSIONS)
+        names += [f'{" and ".join(features)} of material "{name}"' for name, features in self._materials.unused.items()]
+        if names := [*names, *left_out]:
+            log.warning("%s: left out: %s", self._path, ", ".join(names))

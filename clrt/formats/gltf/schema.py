@@ -170,8 +170,31 @@ class Skin(Part):
     inverseBindMatrices: Index | None = None
 
 
+class AnimationTarget(Part):
+    path: str
+    node: Index | None = None
+
+
+class AnimationChannel(Part):
+    sampler: Index
+    target: AnimationTarget
+
+
+class AnimationSampler(Part):
+    input: Index
+    output: Index
+    interpolation: str = "LINEAR"
+
+
+class Animation(Part):
+    channels: list[AnimationChannel]
+    samplers: list[AnimationSampler]
+    name: str | None = None
+
+
 class Scene(Part):
     nodes: list[Index] = []
+    name: str | None = None
 
 
 class Document(Part):
@@ -181,6 +204,7 @@ class Document(Part):
     extensionsRequired: list[str] = []
     extensionsUsed: list[str] = []
     accessors: list[Accessor] = []
+    animations: list[Animation] = []
     buffers: list[Buffer] = []
     bufferViews: list[BufferView] = []
     cameras: list[Camera] = []
@@ -221,12 +245,13 @@ def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
     return items[index]
 
 
-def material_names(document: Document) -> list[str]:
-    """Return a unique name for each material."""
-    names: dict[str, None] = {}
-    for index, source in enumerate(document.materials):
-        names[free_name(source.name or f"material {index}", names)] = None
-    return list(names)
+def unique_names(kind: str, names: Sequence[str | None]) -> list[str]:
+    """Return the names, "KIND N" where there is none, with a number appended to those in use."""
+    unique: dict[str, None] = {}
+    numbers: dict[str, int] = {}
+    for index, name in enumerate(names):
+        unique[free_name(name or f"{kind} {index}", unique, numbers)] = None
+    return list(unique)
 
 
 def _path(location: tuple[int | str, ...]) -> str:
