@@ -35,8 +35,7 @@ def _moved(parts: Sequence[Part], before: Sequence[Part], after: Sequence[Part])
     """Return the parts with those in `before` replaced, one by one if there are as many `after`."""
     if len(before) != len(after):
         replaced = {id(part) for part in before}
-        others = [part for part in parts if id(part) not in replaced]
-        return [*list(after), *others]
+        return list(after) + [part for part in parts if id(part) not in replaced]
     new = {id(old): each for old, each in zip(before, after)}
     return [replace(new[id(part)], material=part.material) if id(part) in new else part for part in parts]
 

@@ -39,10 +39,10 @@ def test_curves_of_vectors(time: float) -> None:
     values, inside = RNG.normal(size=(4, 3, 2)), float(np.clip(time, 0.5, 2.75))
     linear = [np.interp(inside, TIMES, column) for column in values[:, 1].T]
     np.testing.assert_allclose(track(values[:, 1], "LINEAR").at(time), linear, atol=1e-12)
-    before = max(np.searchsorted(TIMES, inside, side="right") - 1, 0)
+    before = max(int(np.searchsorted(TIMES, inside, side="right")) - 1, 0)
     np.testing.assert_array_equal(track(values[:, 1], "STEP").at(time), values[before, 1])
     spline = track(values, "CUBICSPLINE").at(time)
-    piece = min(int(before), 2)
+    piece = min(before, 2)
     ends = slice(piece, piece + 2)
     slopes = np.stack([values[piece, 2], values[piece + 1, 0]])
     np.testing.assert_allclose(spline, CubicHermiteSpline(TIMES[ends], values[ends, 1], slopes)(inside), atol=1e-9)

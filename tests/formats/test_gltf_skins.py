@@ -16,6 +16,7 @@ from ..scene.shapes import icosphere
 from .glb import Gltf, read
 
 VERTICES, FACES = icosphere(1)
+POINTS = VERTICES.astype(np.float64)
 COUNT, JOINTS = len(VERTICES), 3
 Doubles = NDArray[np.float64]
 
@@ -80,7 +81,7 @@ class Skinned:
         return moved, turned
 
 
-def check(skinned: Skinned, tmp_path: Path, vertices: Doubles = VERTICES, normals: Doubles = VERTICES) -> None:
+def check(skinned: Skinned, tmp_path: Path, vertices: Doubles = POINTS, normals: Doubles = POINTS) -> None:
     (mesh,) = read(skinned.gltf, tmp_path).meshes
     moved, turned = skinned.expected(vertices, normals)
     assert mesh.normals is not None
@@ -99,7 +100,7 @@ def test_vertices_follow_their_joints(sets: int, weight: str, inverse: bool, tmp
 def test_weights_are_divided_by_their_sum(tmp_path: Path) -> None:
     """A vertex without weights follows its first joint; negative weights and those that are not finite count as 0."""
     skinned = Skinned()
-    stored = np.float32(skinned.weights * 1.5)
+    stored = (skinned.weights * 1.5).astype(np.float32)
     stored[0], stored[1], stored[2] = 0, (np.nan, 0.5, 0, 0), (-1, 0.25, 0.25, np.inf)
     skinned.primitive["attributes"]["WEIGHTS_0"] = skinned.gltf.accessor(stored)
     skinned.weights[:3] = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0.5, 0.5, 0)
@@ -113,7 +114,7 @@ def test_morph_targets_move_before_joints(tmp_path: Path) -> None:
         {"POSITION": skinned.gltf.accessor(moves[0]), "NORMAL": skinned.gltf.accessor(moves[1])}
     ]
     skinned.node["weights"] = [0.5]
-    check(skinned, tmp_path, VERTICES + 0.5 * moves[0], VERTICES + 0.5 * moves[1])
+    check(skinned, tmp_path, POINTS + 0.5 * moves[0], POINTS + 0.5 * moves[1])
 
 
 def test_surfaces_of_mirroring_joints_keep_their_outside(tmp_path: Path) -> None:
@@ -159,7 +160,7 @@ def test_faults_are_named(tmp_path: Path) -> None:
     skinned.primitive["attributes"]["JOINTS_0"] = skinned.gltf.accessor(joints, "<u1")
     with pytest.raises(SceneError, match='mesh "mesh 0": vertex 5 follows joint 3, but its skin has 3 joints; export'):
         read(skinned.gltf, tmp_path)
-    weights = np.float32(skinned.weights)
+    weights = skinned.weights.astype(np.float32)
     weights[5, 2] = skinned.weights[5, 2] = 0
     skinned.primitive["attributes"]["WEIGHTS_0"] = skinned.gltf.accessor(weights)
     check(skinned, tmp_path)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import clrt
 from clrt.accel.refit import can_refit
@@ -28,15 +29,18 @@ def scene(phase: float, shift: float = 0.0) -> clrt.Scene:
     return clrt.Scene(meshes=meshes, camera=CAMERA, environment=SKY)
 
 
-def image(renderer: clrt.Renderer) -> np.ndarray:
+def begun(device: Device, shown: clrt.Scene) -> clrt.Renderer:
+    return clrt.Renderer(shown, device=device.info.index, size=(24, 16), spp=4, layout="bvh8")
+
+
+def image(renderer: clrt.Renderer) -> NDArray[np.float32]:
     *_, last = renderer.passes()
     return last.pixels
 
 
 def test_moved_scenes_give_the_images_of_new_renderers(device: Device) -> None:
     """After vertices moved the BVH is refitted in place; with other faces it is built again; a camera keeps all."""
-    settings = {"device": device.info.index, "size": (24, 16), "spp": 4, "layout": "bvh8"}
-    renderer = clrt.Renderer(scene(0), **settings)
+    renderer = begun(device, scene(0))
     first = image(renderer)
     assert can_refit(renderer.compiled.tree)
     trees = []
@@ -45,7 +49,7 @@ def test_moved_scenes_give_the_images_of_new_renderers(device: Device) -> None:
     for each in (scene(1.0), scene(2.5, 0.4), replace(scene(2.5, 0.4), camera=clrt.Camera(position=(3, 0, 4))), fewer):
         renderer.show(each)
         trees.append(renderer.compiled.tree.buffers["nodes"])
-        np.testing.assert_array_equal(image(renderer), image(clrt.Renderer(each, **settings)))
+        np.testing.assert_array_equal(image(renderer), image(begun(device, each)))
     assert trees[0] is trees[1] is trees[2] and trees[3] is not trees[0]
     renderer.show(scene(0))
     np.testing.assert_array_equal(image(renderer), first)
@@ -53,7 +57,7 @@ def test_moved_scenes_give_the_images_of_new_renderers(device: Device) -> None:
 
 def test_scenes_that_are_wrong(device: Device) -> None:
     """The last image can still be rendered."""
-    renderer = clrt.Renderer(scene(0), device=device.info.index, size=(24, 16), spp=4, layout="bvh8")
+    renderer = begun(device, scene(0))
     with pytest.raises(clrt.UsageError, match="scene is a float"):
         renderer.show(3.0)  # type: ignore[arg-type]
     with pytest.raises(clrt.SceneError, match="is not finite"):

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import struct
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ..referenced_files import note_read
+from .resources import read_uri
 from .schema import Accessor, Document, Sparse, entry, parse_document
 
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -38,19 +35,8 @@ class GltfData:
         self._buffers: dict[int, Bytes] = {}
 
     def resource(self, uri: str, user: str) -> bytes:
-        """Return the content of a URI: data embedded in it, or a file relative to the model."""
-        if uri.startswith("data:"):
-            try:
-                return base64.b64decode(uri.partition(",")[2], validate=True)
-            except (binascii.Error, ValueError):
-                raise SceneError(f"{user}: its data URI is not base64; export the file again") from None
-        try:
-            file = self.path.parent / unquote(uri)
-            if not file.is_file():
-                raise FileNotFoundError
-            return note_read(file).read_bytes()
-        except (OSError, ValueError):
-            raise SceneError(f'{user}: cannot read the file "{unquote(uri)[:200]}"; put it next to the model') from None
+        """Return the content of a URI, see `read_uri`."""
+        return read_uri(self.path, uri, user)
 
     def view(self, index: int, user: str) -> Bytes:
         """Return the bytes of a buffer view."""

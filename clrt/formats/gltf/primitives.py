@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ class Primitives:
         """Return a primitive with the weighted morph targets applied: in its mesh's frame or, if moved by the matrices
         of `joints` (k, 3, 4), in the world."""
         mesh = stored.mesh
-        moved = {
+        moved: dict[str, Any] = {
             name: morphed(self._data, stored.source, key, values, weights, stored.user)
             for name, key in MORPHED.items()
             if (values := getattr(mesh, name)) is not None

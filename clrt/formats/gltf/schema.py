@@ -19,6 +19,8 @@ Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0)]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
+#: Byte order mark, which some exporters write before the JSON text.
+BOM = b"\xef\xbb\xbf"
 #: Supported extensions.
 EXTENSIONS = frozenset(
     f"KHR_materials_{name}"
@@ -224,7 +226,7 @@ def parse_document(text: bytes) -> Document:
     """Parse a JSON text. Raises SceneError with every property that the specification does not allow, for a version
     other than 2, and for a required extension that is not in EXTENSIONS."""
     try:
-        document = Document.model_validate_json(text)
+        document = Document.model_validate_json(text.removeprefix(BOM))
     except ValidationError as error:
         details = error.errors(include_url=False)
         raise SceneError(
