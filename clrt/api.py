@@ -30,6 +30,7 @@ def load(
     camera: str | None = None,
     *,
     scene: str | int | None = None,
+    variant: str | int | None = None,
     animation: str | int | None = None,
     time: float | None = None,
 ) -> Scene:
@@ -37,12 +38,13 @@ def load(
 
     camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left".
 
-    Of a bare glTF file, by name or number: `scene` is one of its scenes, and `animation` one of its animations, which
-    `animate` renders. time: the seconds at which the animation, by default the first one, is shown as a still.
+    Of a bare glTF file, by name or number: `scene` is one of its scenes, `variant` one of the variants of its materials
+    (KHR_materials_variants), and `animation` one of its animations, which `animate` renders. time: the seconds at which
+    the animation, by default the first one, is shown as a still.
 
     Raises SceneError, which lists all problems.
     """
-    return _load(path, camera, ModelChoice(scene=scene, animation=animation, time=time))
+    return _load(path, camera, ModelChoice(scene=scene, variant=variant, animation=animation, time=time))
 
 
 @listed(RendererOptions, SETTINGS)

@@ -1,4 +1,4 @@
-"""Options for bare glTF files, which may hold several scenes and animations."""
+"""Options for bare glTF files, which may hold several scenes, animations and variants."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ class ModelOptions:
     model_scene: str | None = flag(
         "--scene", metavar="NAME", help="Scene of a bare glTF file, by name or number; see `clrt info`."
     )
+    variant: str | None = flag(
+        "--variant", metavar="NAME", help="Variant of a bare glTF file's materials, by name or number."
+    )
     animation: str | None = flag(
         "--animation",
         metavar="NAME",
@@ -36,4 +39,6 @@ class ModelOptions:
         """Return the choice for `load`."""
         from ..formats.model_choice import ModelChoice
 
-        return ModelChoice(scene=self.model_scene, animation=self.animation, time=self.animation_time)
+        return ModelChoice(
+            scene=self.model_scene, variant=self.variant, animation=self.animation, time=self.animation_time
+        )

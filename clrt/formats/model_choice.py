@@ -1,4 +1,4 @@
-"""What is read of a model file that holds several scenes or animations."""
+"""What is read of a model file that holds several scenes, animations or variants."""
 
 from __future__ import annotations
 
@@ -18,11 +18,13 @@ class ModelChoice:
 
     - scene: which of its scenes
     - animation: which of its animations; None for the pose without any
+    - variant: which of its variants of materials (KHR_materials_variants)
     - time: in seconds, at which the animation, by default the first one, is read as a still
     """
 
     scene: Named | None = None
     animation: Named | None = None
+    variant: Named | None = None
     time: float | None = None
 
     def __post_init__(self) -> None:

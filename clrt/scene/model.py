@@ -89,7 +89,7 @@ class Model:
     """Content of a model file: meshes or instances, at least one, cameras by name in file order, and lights.
 
     - animation: the file's first one, or the one that was chosen
-    - contents: names of all that can be chosen, by kind: scenes, animations
+    - contents: names of all that can be chosen, by kind: scenes, animations, variants
     """
 
     meshes: list[Mesh]

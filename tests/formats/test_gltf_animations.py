@@ -174,7 +174,11 @@ def test_scenes_by_name(tmp_path: Path) -> None:
     assert heights == pytest.approx(np.array([0, 9, 9, 9, 0]) + heights[0])
     assert clrt.load(path, scene="0").meshes[0].vertices[:, 2].max() > 9, "a name comes first"
     source = load(path).source
-    assert source is not None and source.contents == {"scenes": ["scene 0", "far", "0"], "animations": []}
+    assert source is not None and source.contents == {
+        "scenes": ["scene 0", "far", "0"],
+        "animations": [],
+        "variants": [],
+    }
     with pytest.raises(SceneError, match=r'a.glb: scene: "fr" is unknown; use one of "scene 0", "far", "0"'):
         clrt.load(path, scene="fr")
 

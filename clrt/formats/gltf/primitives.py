@@ -98,20 +98,22 @@ def _stored(data: GltfData, materials: Materials, index: int) -> Iterator[Stored
             _attribute(data, primitive, key, kind, len(vertices), where)
             for key, kind in [("NORMAL", "VEC3"), ("TANGENT", "VEC4"), ("TEXCOORD_0", "VEC2"), ("TEXCOORD_1", "VEC2")]
         )
-        faces = corners.astype(np.int32)
-        mesh = Mesh(
-            vertices,
-            faces,
-            materials.material(primitive, where, [uv, uv1], faces),
-            normal,
-            name,
-            uv=uv,
-            uv1=uv1,
-            colors=_colors(data, primitive, len(vertices), where),
-            tangents=tangent,
-            material_name="" if primitive.material is None else materials.names[primitive.material],
-        )
-        yield StoredPrimitive(primitive, mesh, where, read_influences(data, primitive, len(vertices), where))
+        colors = _colors(data, primitive, len(vertices), where)
+        influences = read_influences(data, primitive, len(vertices), where)
+        for material, faces in materials.materials(primitive, where, [uv, uv1], corners.astype(np.int32), colors):
+            mesh = Mesh(
+                vertices,
+                faces,
+                material,
+                normal,
+                name,
+                uv=uv,
+                uv1=uv1,
+                colors=colors,
+                tangents=tangent,
+                material_name=materials.name(primitive),
+            )
+            yield StoredPrimitive(primitive, mesh, where, influences)
 
 
 def _attribute(

@@ -65,15 +65,18 @@ class GltfFile:
     def __init__(self, path: Path, normals: Normals, choice: ModelChoice) -> None:
         self._path, self._choice = path, choice
         self._data = GltfData(path)
-        self._materials = Materials(self._data)
-        self._primitives = Primitives(self._data, self._materials, normals)
-        self._shapes: dict[Shape, Mesh] = {}
         document = self._data.document
+        variants = document.extensions.KHR_materials_variants.variants
         self._names = {
             "scenes": gltf.unique_names("scene", [scene.name for scene in document.scenes]),
             "animations": animation_names(document),
+            "variants": gltf.unique_names("variant", [variant.name for variant in variants]),
         }
         self._scene = None if choice.scene is None else chosen(choice.scene, self._names["scenes"], "scene")
+        variant = None if choice.variant is None else chosen(choice.variant, self._names["variants"], "variant")
+        self._materials = Materials(self._data, variant)
+        self._primitives = Primitives(self._data, self._materials, normals)
+        self._shapes: dict[Shape, Mesh] = {}
 
     def model(self) -> Model:
         """Return the model as chosen, with its animation, and log what is left out."""
@@ -149,7 +152,8 @@ class GltfFile:
         document = self._data.document
         primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
         names = ["points and lines"] if any(primitive.mode < TRIANGLES for primitive in primitives) else []
-        names += sorted(f"the extension {name}" for name in set(document.extensionsUsed) - gltf.EXTENSIONS)
+        used = {*document.extensionsUsed, *document.extensionsRequired}
+        names += sorted(f"the extension {name}" for name in used - gltf.EXTENSIONS)
         names += [f'{" and ".join(features)} of material "{name}"' for name, features in self._materials.unused.items()]
         if names := [*names, *left_out]:
             log.warning("%s: left out: %s", self._path, ", ".join(names))

@@ -5,6 +5,7 @@ Imported only when a glTF file is read, since it needs pydantic. Unknown propert
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Annotated, Literal, TypeVar
 
@@ -24,7 +25,18 @@ BOM = b"\xef\xbb\xbf"
 #: Supported extensions.
 EXTENSIONS = frozenset(
     f"KHR_materials_{name}"
-    for name in ("clearcoat", "emissive_strength", "ior", "sheen", "specular", "transmission", "volume")
+    for name in (
+        "clearcoat",
+        "emissive_strength",
+        "ior",
+        "pbrSpecularGlossiness",
+        "sheen",
+        "specular",
+        "transmission",
+        "unlit",
+        "variants",
+        "volume",
+    )
 ) | frozenset(
     {
         "EXT_mesh_gpu_instancing",
@@ -34,6 +46,11 @@ EXTENSIONS = frozenset(
         "KHR_mesh_quantization",
         "KHR_texture_transform",
     }
+)
+#: Extensions that change only how surfaces look or move: files that require them are read without.
+OPTIONAL = re.compile(
+    r"[A-Z0-9]+_(materials|texture|lights|animation|audio|interactivity|xmp|node_hoverability|node_selectability|"
+    r"physics|collision|\w*metadata|\w*features)"
 )
 
 
@@ -86,8 +103,18 @@ class Draco(Part):
     attributes: dict[str, Index]
 
 
+class VariantMapping(Part):
+    material: Index
+    variants: list[Index]
+
+
+class VariantMappings(Part):
+    mappings: list[VariantMapping] = []
+
+
 class PrimitiveExtensions(Part):
     KHR_draco_mesh_compression: Draco | None = None
+    KHR_materials_variants: VariantMappings = VariantMappings()
 
 
 class Primitive(Part):
@@ -149,8 +176,17 @@ class NodeExtensions(Part):
     KHR_lights_punctual: UsedLight | None = None
 
 
+class Variant(Part):
+    name: str | None = None
+
+
+class Variants(Part):
+    variants: list[Variant] = []
+
+
 class DocumentExtensions(Part):
     KHR_lights_punctual: Lights = Lights()
+    KHR_materials_variants: Variants = Variants()
 
 
 class Node(Part):
@@ -224,7 +260,7 @@ class Document(Part):
 
 def parse_document(text: bytes) -> Document:
     """Parse a JSON text. Raises SceneError with every property that the specification does not allow, for a version
-    other than 2, and for a required extension that is not in EXTENSIONS."""
+    other than 2, and for a required extension that is in neither EXTENSIONS nor OPTIONAL."""
     try:
         document = Document.model_validate_json(text.removeprefix(BOM))
     except ValidationError as error:
@@ -234,7 +270,7 @@ def parse_document(text: bytes) -> Document:
         ) from None
     if not document.asset.version.startswith("2."):
         raise SceneError(f'asset.version is "{document.asset.version}"; only glTF 2 is supported, export it as 2.0')
-    missing = sorted(set(document.extensionsRequired) - EXTENSIONS)
+    missing = [name for name in sorted(set(document.extensionsRequired) - EXTENSIONS) if not OPTIONAL.match(name)]
     if missing:
         raise SceneError(f"needs the extension {', '.join(missing)}, which is not supported; export without it")
     return document
