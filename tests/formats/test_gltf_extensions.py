@@ -80,7 +80,7 @@ def test_unlit_textures_and_vertex_colors(tmp_path: Path, caplog: pytest.LogCapt
     pbr = {"baseColorTexture": image(gltf, [[[9, 99, 199]]]), "baseColorFactor": [1, 0.5, 0.25, 1]}
     (mesh,) = with_uv(tmp_path, gltf, {**UNLIT, "pbrMetallicRoughness": pbr}, np.zeros((1, 3, 2)))
     emission = mesh.material.emission
-    assert isinstance(emission, Texture) and emission.factor == (1, 0.5, 0.25)
+    assert isinstance(emission, Texture) and emission.factor == pytest.approx((1, 0.5, 0.25))
     assert emission.picture.texels.tolist() == [[[9, 99, 199, 255]]] and mesh.material.opacity == 1
     even = np.tile([0.5, 1, 0.5], (COUNT, 1))
     assert of(tmp_path, UNLIT, even).emission == pytest.approx((0.4, 0.2, 0.05)) and not caplog.text
@@ -133,7 +133,7 @@ def test_specular_glossiness(tmp_path: Path) -> None:
     assert f0 == pytest.approx([0.9, 0.6, 0.04]) and made.specular == 1
     assert (made.color, made.metallic, made.roughness, made.opacity) == ((0.5, 0.25, 0.125), 0, 0.25, 0.5)
     plain = of(tmp_path, {"extensions": {"KHR_materials_pbrSpecularGlossiness": {}}})
-    assert isinstance(plain, MetallicRoughness) and plain.color == (1, 1, 1) and plain.roughness == 0
+    assert isinstance(plain, MetallicRoughness) and plain.color == pytest.approx((1, 1, 1)) and plain.roughness == 0
 
 
 def test_specular_glossiness_textures(tmp_path: Path) -> None:
@@ -188,7 +188,9 @@ def test_glass_next_to_metal_in_one_primitive(tmp_path: Path) -> None:
     sheet, solid = with_uv(tmp_path, gltf, material, uv)
     assert sheet.faces.tolist() == [[3, 4, 5], [6, 7, 8]] and isinstance(sheet.material, MetallicRoughness)
     assert solid.faces.tolist() == [[0, 1, 2], [9, 10, 11]] and isinstance(solid.material, Dielectric)
-    assert solid.material.attenuation_color == (0.25, 0.5, 1) and solid.material.attenuation_distance == 4
+    assert (
+        solid.material.attenuation_color == pytest.approx((0.25, 0.5, 1)) and solid.material.attenuation_distance == 4
+    )
 
 
 def test_sheets_have_the_color_of_their_volume(tmp_path: Path) -> None:

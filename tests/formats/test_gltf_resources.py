@@ -59,6 +59,8 @@ def test_names_in_another_case(tmp_path: Path, caplog: pytest.LogCaptureFixture)
     """Read with a warning, unless several files differ in case alone."""
     (tmp_path / "Textures").mkdir()
     (tmp_path / "Textures" / "Wood.PNG").write_bytes(b"wood")
+    if (tmp_path / "textures").exists():
+        pytest.skip("this file system ignores case")
     with caplog.at_level(logging.WARNING):
         assert read_uri(tmp_path / "a.gltf", "textures\\wood.png", "image 3") == b"wood"
     assert 'image 3: there is no file "textures\\wood.png"; read "Wood.PNG" instead' in caplog.text

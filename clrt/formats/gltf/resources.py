@@ -30,9 +30,9 @@ def read_uri(model: Path, uri: str, user: str) -> bytes:
         for each in (name, uri, name.replace("\\", "/")):
             if (file := model.parent / each).is_file():
                 return note_read(file).read_bytes()
-        if file := _in_another_case(model.parent, name.replace("\\", "/")):
-            log.warning('%s: %s: there is no file "%s"; read "%s" instead', model, user, name, file.name)
-            return note_read(file).read_bytes()
+        if near := _in_another_case(model.parent, name.replace("\\", "/")):
+            log.warning('%s: %s: there is no file "%s"; read "%s" instead', model, user, name, near.name)
+            return note_read(near).read_bytes()
     except (OSError, ValueError):
         pass
     raise SceneError(f'{user}: cannot read the file "{name[:200]}"; put it next to the model')
