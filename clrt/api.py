@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .file_names import StrPath
 from .float_errors import with_default_errors
 from .formats.load_scene import load as _load
+from .formats.model_choice import ModelChoice
 from .output.data_images import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
@@ -24,13 +25,26 @@ from .scene.model import Scene
 
 
 @with_default_errors
-def load(path: StrPath, camera: str | None = None) -> Scene:
+def load(
+    path: StrPath,
+    camera: str | None = None,
+    *,
+    scene: str | int | None = None,
+    variant: str | int | None = None,
+    animation: str | int | None = None,
+    time: float | None = None,
+) -> Scene:
     """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (.glb .gltf .obj .ply .stl .off).
 
     camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left".
+
+    Of a bare glTF file, by name or number: `scene` is one of its scenes, `variant` one of the variants of its materials
+    (KHR_materials_variants), and `animation` one of its animations, which `animate` renders. time: the seconds at which
+    the animation, by default the first one, is shown as a still.
+
     Raises SceneError, which lists all problems.
     """
-    return _load(path, camera)
+    return _load(path, camera, ModelChoice(scene=scene, variant=variant, animation=animation, time=time))
 
 
 @listed(RendererOptions, SETTINGS)
@@ -65,19 +79,19 @@ def animate(
     denoise: bool = False,
     **options: Unpack[RendererOptions],
 ) -> Iterator[tuple[int, Image]]:
-    """Render a scene with camera animation, all `frames` or the given numbers; yields each frame's number and image.
+    """Render an animation, all `frames` or the given numbers; yields each frame's number and image.
 
     The other arguments are as in `render`, per frame. Raises SceneError if the scene has no animation, and subclasses
     of ClrtError.
     """
     denoiser = Denoiser() if denoise else None
-    scene = scene if isinstance(scene, Scene) else load(scene)
+    scene = scene if isinstance(scene, Scene) else _load(scene, moving=True)
     renderer, stops = None, Stops(options.get("spp"), time, error)
     for number, still in _frames(scene, frames):
         if renderer is None:
             renderer = _renderer(still, stops, denoise, options)
         else:
-            renderer.look(still.camera)
+            renderer.show(still)
         yield number, _rendered(renderer, denoiser, None, stops)
 
 

@@ -10,6 +10,8 @@ import click
 
 from . import PROGRAM
 from .guard import guarded
+from .model_options import ModelOptions
+from .option_groups import grouped
 from .option_types import Pixel
 from .options import picture_options, tracing_options
 
@@ -35,6 +37,7 @@ from .options import picture_options, tracing_options
 @click.option("--device", metavar="SEL", help="Device: number, id, part of a name, cpu or gpu; see `clrt devices`.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @picture_options
+@grouped("model", ModelOptions)
 @tracing_options
 def command(
     scene: Path,
@@ -43,6 +46,7 @@ def command(
     device: str | None,
     as_json: bool,
     camera: str | None,
+    model: ModelOptions,
     **given: Any,
 ) -> None:
     """Show the light paths of one pixel of SCENE, and why it is black or where its light comes from. With the options
@@ -59,7 +63,7 @@ def command(
     from ..output.json_text import json_text
     from ..rendering.renderer_options import choices_of, settings_of
 
-    content = load(scene, camera)
+    content = load(scene, camera, model.choice)
     content.render = settings = settings_of(content.render, given)
     pixel = pixel or (settings.size[0] // 2, settings.size[1] // 2)
     paths = trace_pixel(content, open_device(device), pixel, choices_of(given))

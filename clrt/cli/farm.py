@@ -124,24 +124,24 @@ def render_frames(
     from ..farm.orders import PictureOrder
     from ..farm.whole_pictures import WholePictures
     from ..output.image import Image
+    from ..rendering.compile.visible_parts import same_world
 
     order = PictureOrder(scene, _of_worker(options), goal.spp, goal.seconds, goal.error, sequence.outputs.denoise)
     shots = {
-        f"frame {results.header['frame']}": (results, camera)
-        for results, camera in sequence.left(order.settled, order.choices, goal)
+        f"frame {results.header['frame']}": results for results, _ in sequence.left(order.settled, order.choices, goal)
     }
-    pictures = WholePictures(
-        cluster,
-        list(shots),
-        lambda name: replace(order, camera=shots[name][1]),
-        cast(tuple[str, ...], options["device"] or ()),
-    )
+
+    def order_of(name: str) -> PictureOrder:
+        still = sequence.still(shots[name].header["frame"])
+        return replace(order, camera=still.camera) if same_world(still, scene) else replace(order, scene=still)
+
+    pictures = WholePictures(cluster, list(shots), order_of, cast(tuple[str, ...], options["device"] or ()))
     interrupted, done, warned = list[bool](), 0, set[str]()
     progress.phase("render")
     with Interruptible(lambda: interrupted.append(True)):
         for found in pictures.results():
             if found is not None:
-                results, image = shots[found[0]][0], Image(**found[1])
+                results, image = shots[found[0]], Image(**found[1])
                 progress.frame(results.header["frame"], done, len(shots))
                 done += 1
                 _warn(scene, sorted({*image.report["warnings"]} - warned))

@@ -1,4 +1,4 @@
-"""`clrt render --frames`: the frames of a scene with a moving camera, as numbered files and videos."""
+"""`clrt render --frames`: the frames of an animation, as numbered files and videos."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .outputs import Outputs
 
 if TYPE_CHECKING:
     from ..rendering.compile.choices import Choices
-    from ..scene.model import Camera, Scene
+    from ..scene.model import Scene
 
 #: Fields of Outputs that do not affect an image's content.
 FILES = {"inputs", "pictures", "report", "plot", "force", "header", "spool", "pipes", "_errors"}
@@ -89,13 +89,21 @@ class FrameSequence:
             scene = turned(scene, asked.turntable, asked.fps or Animation.fps)
         elif asked.fps is not None and scene.animation is not None:
             scene = replace(scene, animation=replace(scene.animation, fps=asked.fps))
-        self._stills = {number: still.camera for number, still in frames(scene, self.chosen)}
-        self._fps = scene.animation.fps if scene.animation else 0.0
+        self._moving, (_, first) = scene, next(frames(scene, self.chosen))
+        assert scene.animation is not None
+        self._numbers = range(scene.animation.frames) if self.chosen is None else self.chosen
+        self._fps, self.remaining = scene.animation.fps, len(self._numbers)
         for video in self.videos:
             check_video(video, size or scene.render.size, self._fps)
             check_unprotected(video, self.outputs.force)
         self._of(0).check()
-        return replace(scene, camera=next(iter(self._stills.values())), animation=None)
+        return first
+
+    def still(self, number: int) -> Scene:
+        """Return the scene of a frame."""
+        from ..scene.camera_path import frames
+
+        return next(frames(self._moving, [number]))[1]
 
     def _of(self, number: int) -> Outputs:
         """Return the outputs of a frame."""
@@ -110,7 +118,7 @@ class FrameSequence:
     def check_apart(self, inputs: Iterable[Path]) -> None:
         """Apply `Outputs.check_apart` to every frame and video."""
         files = {os.path.realpath(path) for path in inputs}
-        for number in self._stills:
+        for number in self._numbers:
             self._of(number).check_apart(inputs)
         for video in self.videos:
             if os.path.realpath(video) in files:
@@ -118,27 +126,35 @@ class FrameSequence:
                     f"{video}: is both a file of the scene and a video, one of which would be lost; choose another file"
                 )
 
-    def left(self, scene: Scene, choices: Choices, goal: object) -> Iterator[tuple[Outputs, Camera]]:
-        """Yield outputs and camera of each remaining frame. Finished images contain a hash of all they depend on."""
+    def left(self, scene: Scene, choices: Choices, goal: object) -> Iterator[tuple[Outputs, Scene]]:
+        """Yield outputs and scene of each frame to render, with the settings of `scene`; `remaining` excludes those
+        that were finished. Images contain a hash of all they depend on."""
         from ..output.atomic_files import make_folder
         from ..output.images import metadata_of
         from ..rendering.checkpoint.identity import facts_of
+        from ..rendering.compile.visible_parts import same_world
+        from ..scene.camera_path import frames
 
-        facts = {**facts_of(scene, choices), "camera": ""}
         asked = self.outputs
         shown = [(each.name, getattr(asked, each.name)) for each in fields(asked) if each.name not in FILES]
         if asked.spool:
             make_folder(asked.spool.parent)
-        for number, camera in self._stills.items():
-            made_of = repr((sorted(facts.items()), camera, goal, shown))
+        last, facts = None, dict[str, str]()
+        for number, still in frames(self._moving, self.chosen):
+            still = replace(still, render=scene.render)
+            if last is None or not same_world(still, last):
+                last, facts = still, {**facts_of(still, choices), "camera": ""}
+            made_of = repr((sorted(facts.items()), still.camera, goal, shown))
             digest = hashlib.sha256(made_of.encode()).hexdigest()
             outputs = replace(self._of(number), header={"frame": number, "frame_hash": digest})
             done = self.resume and all(
                 metadata_of(path, "clrt:frame_hash") == digest for path in (*outputs.pictures, *outputs.raws)
             )
-            if not (done and all(path.is_file() for path in (*outputs.beside, outputs.report) if path)):
+            if done and all(path.is_file() for path in (*outputs.beside, outputs.report) if path):
+                self.remaining -= 1
+            else:
                 outputs.check_unprotected()
-                yield outputs, camera
+                yield outputs, still
 
     def join(self) -> None:
         """Write the videos, and remove frames that were only written for them."""
@@ -147,12 +163,12 @@ class FrameSequence:
         pattern = next((path for path in self.outputs.pictures if path.suffix.lower() == ".png"), Path())
         for video in self.videos:
             try:
-                write_video(video, [numbered(pattern, number) for number in self._stills], self._fps)
+                write_video(video, [numbered(pattern, number) for number in self._numbers], self._fps)
             except OutputError as error:
                 raise OutputError(f"{error}; its frames are in {pattern}: --resume encodes them") from error
             click.echo(str(video))
         if spool := self.outputs.spool:
-            for number in self._stills:
+            for number in self._numbers:
                 numbered(spool, number).unlink(missing_ok=True)
             with suppress(OSError):  # it may contain other files
                 spool.parent.rmdir()

@@ -15,6 +15,7 @@ from .frames import FrameOptions
 from .guard import guarded
 from .interrupt import end_by_signals
 from .logs import silence, verbose_option
+from .model_options import ModelOptions
 from .option_groups import grouped
 from .options import picture_options, tracing_options
 from .render_job import INTERRUPTED, RenderJob
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 @click.argument("scene", type=click.Path(path_type=Path))
 @grouped("asked", OutputOptions)
 @picture_options
+@grouped("model", ModelOptions)
 @grouped("stop", StopOptions)
 @click.option(
     "--device",
@@ -46,6 +48,7 @@ def command(
     scene: Path,
     camera: str | None,
     devices: tuple[str, ...],
+    model: ModelOptions,
     asked: OutputOptions,
     stop: StopOptions,
     saving: SavingOptions,
@@ -65,6 +68,7 @@ def command(
     job = RenderJob(
         scene,
         camera,
+        model,
         asked,
         stop,
         saving,

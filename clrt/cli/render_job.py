@@ -18,6 +18,7 @@ from .farm import is_huge, make_renderer, render_frames, render_huge
 from .frames import FrameOptions, FrameSequence, make_sequence
 from .goal import Goal
 from .interrupt import Interruptible
+from .model_options import ModelOptions
 from .outputs import Outputs
 from .pipes import split_pipes
 from .progress import Progress
@@ -43,6 +44,7 @@ class RenderJob:
 
     scene: Path
     camera: str | None
+    model: ModelOptions
     asked: OutputOptions
     stop: StopOptions
     saving: SavingOptions
@@ -92,6 +94,8 @@ class RenderJob:
         """Return the frames to render; None for a still image."""
         if not self.frames.many:
             return None
+        if self.frames.frames is not None and self.model.animation_time is not None:
+            raise UsageError("--animation-time is the time of a still; leave it out, or leave out --frames")
         still_only = {"checkpoint": self.saving.checkpoint, "reference": self.asked.reference, "plot": self.asked.plot}
         return make_sequence(self.results, self.frames.frames, self.saving.resume, still_only)
 
@@ -129,7 +133,7 @@ class RenderJob:
 
         progress.phase("load")
         with files_read() as inputs:
-            content = load(self.scene, self.camera)
+            content = load(self.scene, self.camera, self.model.choice, moving=self.frames.frames is not None)
         if self.sequence is None:
             self.results.check_apart(inputs, self.saving.checkpoint)
         else:
@@ -214,10 +218,9 @@ def _render_frames(
     renderer: Renderer, sequence: FrameSequence, goal: Goal, denoiser: Denoiser | None, progress: Progress
 ) -> None:
     """Render the remaining frames, each to the goal, and encode the videos."""
-    shots = list(sequence.left(renderer.scene, renderer.choices, goal))
-    for done, (results, camera) in enumerate(shots):
-        progress.frame(results.header["frame"], done, len(shots))
-        renderer.look(camera)
+    for done, (results, still) in enumerate(sequence.left(renderer.scene, renderer.choices, goal)):
+        progress.frame(results.header["frame"], done, sequence.remaining)
+        renderer.show(still)
         render_image(renderer, results, goal, None, denoiser, progress)
         if renderer.stop_reason == "interrupted":
             return

@@ -38,6 +38,7 @@ def _contents(scene: Scene, compiled: CompiledScene) -> dict[str, Any]:
         },
         "spheres": len(scene.spheres),
         "cameras": list(scene.cameras),
+        **{kind: list(names) for kind, names in (scene.source.contents if scene.source else {}).items()},
         "materials": dict(Counter(material.kernel for material in materials)),
         "lights": {
             "entries": int(compiled.counts["lights"][0]),

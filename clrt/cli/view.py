@@ -15,7 +15,8 @@ from . import PROGRAM
 from .guard import guarded
 from .interrupt import Interruptible
 from .logs import verbose_option
-from .option_groups import settings_options
+from .model_options import ModelOptions
+from .option_groups import grouped, settings_options
 from .options import CAMERA, NAMES
 
 
@@ -32,9 +33,16 @@ from .options import CAMERA, NAMES
 )
 @click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform; see `clrt render`.")
 @click.option("--exposure", default=0.0, metavar="EV", help="In stops.")
+@grouped("model", ModelOptions)
 @verbose_option
 def command(
-    scene: Path, camera: str | None, devices: tuple[str, ...], view: str, exposure: float, **given: Any
+    scene: Path,
+    camera: str | None,
+    devices: tuple[str, ...],
+    view: str,
+    exposure: float,
+    model: ModelOptions,
+    **given: Any,
 ) -> None:
     """Show SCENE, a .toml scene or a model, in an interactive window: navigate, edit, watch it refine
     (docs/window.md)."""
@@ -56,7 +64,7 @@ def command(
     chosen = {name: value for name, value in given.items() if value is not None}
     if problems := field_problems(RenderSettings, chosen, "render"):
         raise UsageError("\n".join(problems))
-    content = load(scene, camera)
+    content = load(scene, camera, model.choice)
     content.render = replace(content.render, **chosen)
     app = App(content, Settings(device=devices or None), DisplaySettings(view, exposure))
     with Interruptible(app.close) as interruptible:

@@ -30,7 +30,7 @@ class BandRenderer(Renderer):
     _pool: DevicePool | None = None
     _band = (0, 1)
 
-    def show(self, band: tuple[int, int]) -> None:
+    def begin_band(self, band: tuple[int, int]) -> None:
         """Start with tile rows first … end − 1."""
         self._band = band
         self._progress.session = self._make_picture()
@@ -70,7 +70,7 @@ def _renderer(key: str, order: PictureOrder) -> Renderer:
         _kept[key] = kind(order.scene, spp=planned, **order.options)
     renderer = _kept[key]
     if isinstance(renderer, BandRenderer) and order.band is not None:
-        renderer.show(order.band)
+        renderer.begin_band(order.band)
     else:
         renderer.look(order.camera or order.scene.camera)
     return renderer

@@ -71,7 +71,11 @@ class FarmRenderer(Renderer):
 
     def _turn_to(self, camera: Camera) -> None:
         """Start a new image. Many images are better rendered by one worker each (whole_pictures.py)."""
-        self.scene = replace(self.scene, camera=camera)
+        self._show(replace(self.scene, camera=camera))
+
+    def _show(self, scene: Scene) -> None:
+        validate(scene)
+        self.scene = scene
         self._progress.session = self._make_picture()
 
     @property

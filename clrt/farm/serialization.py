@@ -20,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from ..scene.animation import ModelAnimation
 
 #: Size in bytes from which on an array is sent separately.
 LARGE = 1 << 14
-#: Placeholder for the client's file paths, which have no meaning elsewhere: they arrive as None.
+#: Placeholder for the client's file paths and models' animations, which have no meaning elsewhere: they arrive as None.
 HERE = "a file"
 #: Classes that a pickle may name: the dataclasses of these modules, and single names.
 ROOMS = ("clrt.scene.", "clrt.accel.methods", "clrt.rendering.compile.choices", "clrt.farm.orders")
@@ -89,7 +90,7 @@ class _Pickler(pickle.Pickler):
     digests: dict[int, str]
 
     def persistent_id(self, value: object) -> str | None:
-        if isinstance(value, PurePath):
+        if isinstance(value, PurePath | ModelAnimation):
             return HERE
         if not isinstance(value, np.ndarray) or value.nbytes < LARGE or value.dtype.hasobject:
             return None

@@ -13,10 +13,11 @@ from ..errors import SceneError
 from ..file_names import StrPath
 from ..scene.default_sky import SUN, default_sky
 from ..scene.geometry.transform import rotation, transform_light, transform_mesh
-from ..scene.model import Scene
+from ..scene.model import Instance, Mesh, Model, Scene
 from ..scene.provenance import source_of_model
 from ..scene.validation.validate import scene_problems
 from .frame_model import VIEWS, frame
+from .model_choice import DEFAULT, ModelChoice
 from .models import FORMATS, SUFFIXES, read_model
 from .referenced_files import check_file, name_of
 from .toml.reader import SceneReader, camera_problems
@@ -24,24 +25,29 @@ from .toml.reader import SceneReader, camera_problems
 log = logging.getLogger(__name__)
 #: Stands for a TOML scene on standard input; its file names are relative to the working directory.
 STDIN = Path("-")
+#: Number of poses of an animation that the camera of a bare model frames.
+POSES = 17
 #: How bare models are rotated if +Z is up in their format and −Y the front.
 UPRIGHT = (-90.0, 0.0, 0.0)
 
 
-def load(path: StrPath, camera: str | None = None) -> Scene:
+def load(path: StrPath, camera: str | None = None, choice: ModelChoice = DEFAULT, moving: bool = False) -> Scene:
     """Load a scene from a .toml file, a Mitsuba .xml file, a model file (whose meshes get a sky, a sun and a camera),
     or from standard input for "-".
 
     A glTF model's first camera and its lights are used if it has any. camera: name of another camera to use, of a scene
-    or a model file, or for a model one of VIEWS. Raises one SceneError with all problems of the file, each as "FILE:
-    object: value is wrong; remedy".
+    or a model file, or for a model one of VIEWS; choice: for bare models; moving: whether a camera that frames a model
+    frames its animation, as it does if one is chosen. Raises one SceneError with all problems of the file, each as
+    "FILE: object: value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
         raise SceneError(f'{path!r} is not the path of a scene; give a file name, such as "scene.toml"')
     path = Path(path)
     check_scene(path)
     reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower())
-    scene, problems = reader(path) if reader else (_load_model(path, camera), [])
+    if reader and choice != DEFAULT:
+        raise SceneError(f"{path}: {choice.given()[0]}: is for bare models; leave {choice.given()[0]} out")
+    scene, problems = reader(path) if reader else (_load_model(path, camera, choice, moving), [])
     views = [] if reader else [name for name in VIEWS if name not in scene.cameras]
     if camera is not None and camera not in views:
         scene.camera = scene.cameras.get(camera, scene.camera)
@@ -62,12 +68,12 @@ def check_scene(path: Path) -> None:
         raise SceneError(f"{path}: a scene must be one of {', '.join((*_READERS, *SUFFIXES))}; convert it")
 
 
-def _load_model(path: Path, view: str | None) -> Scene:
+def _load_model(path: Path, view: str | None, choice: ModelChoice, moving: bool) -> Scene:
     """Load a bare model with the default sky, its own lights or the sun, and its first camera or one that frames it.
 
-    view: one of VIEWS replaces the model's cameras, except one of that name.
+    view: one of VIEWS replaces the model's cameras, except one of that name; choice, moving: see `load`.
     """
-    model = read_model(path)
+    model = read_model(path, choice=choice)
     placing: dict[str, Any] = {}
     if FORMATS[path.suffix.lower()].z_up:
         placing = {"rotate_degrees": UPRIGHT}
@@ -79,13 +85,23 @@ def _load_model(path: Path, view: str | None) -> Scene:
     return Scene(
         meshes=model.meshes,
         instances=model.instances,
-        camera=camera or frame(model.meshes, model.instances, turn),
+        camera=camera or frame(*_framed(model, moving or choice.animation is not None), turn),
         cameras=model.cameras,
         environment=default_sky(),
         lights=model.lights or [sun],
         name=name_of(path),
-        source=source_of_model(path, model, placing),
+        animation=model.animation,
+        source=source_of_model(path, model, placing, whole=choice == DEFAULT),
     )
+
+
+def _framed(model: Model, moving: bool) -> tuple[list[Mesh], list[Instance]]:
+    """Return the model's meshes and instances, if `moving` at POSES times of its animation."""
+    animation = model.animation
+    if animation is None or not moving:
+        return model.meshes, model.instances
+    poses = [animation.pose(animation.seconds * i / (POSES - 1)) for i in range(POSES)]
+    return [mesh for pose in poses for mesh in pose.meshes], [each for pose in poses for each in pose.instances]
 
 
 def _load_toml(path: Path) -> tuple[Scene, list[str]]:

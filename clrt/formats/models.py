@@ -24,6 +24,7 @@ from ..scene.materials.material_types import Diffuse
 from ..scene.model import Mesh, Model
 from ..scene.validation.validate import index_problems, mesh_problems
 from .images.image_reader import linear_from_srgb
+from .model_choice import DEFAULT, ModelChoice
 from .ply import plain_ply
 from .referenced_files import check_file, name_of
 
@@ -36,24 +37,30 @@ def read_mesh(path: StrPath, normals: Normals = "file") -> list[Mesh]:
     return model.meshes + [baked(each) for each in model.instances]
 
 
-def read_model(path: StrPath, normals: Normals = "file") -> Model:
+def read_model(path: StrPath, normals: Normals = "file", choice: ModelChoice = DEFAULT) -> Model:
     """Read a model file: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
 
-    Polygons become triangle fans. `normals`: see `choose_normals`. Raises SceneError naming the file, the mesh, and the
-    index or vertex that is wrong.
+    Polygons become triangle fans. `normals`: see `choose_normals`; choice: for glTF files. Raises SceneError naming the
+    file, the mesh, and the index or vertex that is wrong.
     """
     path = Path(path)
     format = FORMATS.get(path.suffix.lower())
     if format is None:
         raise SceneError(f"{path}: a model must be one of {', '.join(SUFFIXES)}; convert it")
     check_file(path, "model")
+    if format.chooses:
+        return format.read(path, normals, choice)
+    if choice != DEFAULT:
+        raise SceneError(
+            f"{path}: {choice.given()[0]}: only a glTF file has several to choose from; leave {choice.given()[0]} out"
+        )
     return format.read(path, normals)
 
 
-def _gltf(path: Path, normals: Normals) -> Model:
+def _gltf(path: Path, normals: Normals, choice: ModelChoice) -> Model:
     from .gltf.reader import read_gltf
 
-    return read_gltf(path, normals)
+    return read_gltf(path, normals, choice)
 
 
 def _obj(path: Path) -> dict[str, Any]:
@@ -103,16 +110,17 @@ def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals
 
 class ModelFormat(NamedTuple):
     """Format of model files. read: its reader, which raises SceneError naming the file; z_up: whether +Z is up and −Y
-    the front, as in CAD and 3D printing."""
+    the front, as in CAD and 3D printing; chooses: whether the reader's last argument is a ModelChoice."""
 
-    read: Callable[[Path, Normals], Model]
+    read: Callable[..., Model]
     z_up: bool = False
+    chooses: bool = False
 
 
 #: Model formats by suffix.
 FORMATS = {
-    ".glb": ModelFormat(_gltf),
-    ".gltf": ModelFormat(_gltf),
+    ".glb": ModelFormat(_gltf, chooses=True),
+    ".gltf": ModelFormat(_gltf, chooses=True),
     ".obj": ModelFormat(of_parts(_obj)),
     ".ply": ModelFormat(of_parts(_ply)),
     ".stl": ModelFormat(of_parts(_stl), z_up=True),

@@ -25,6 +25,7 @@ from .checkpoint.checkpoints import check_of_none, open_checkpoints
 from .compile.camera_kernel import camera_file
 from .compile.compile_scene import CompiledScene
 from .compile.scene_compiler import SceneCompiler
+from .compile.visible_parts import same_world
 from .error_estimate.adaptive_sampling import most_planned
 from .film.state import State as State, check_reference
 from .listed_keywords import listed
@@ -126,6 +127,27 @@ class Renderer:
         with self._turns.one():
             self._asked_for = camera
             self._see()
+
+    def show(self, scene: Scene) -> None:
+        """Start a new image of another scene with the same settings, like `look` if only the camera differs.
+
+        BVHs, buffers and the program are reused as far as they are the same. If only vertices moved, the BVH is
+        refitted where its layout allows it. Raises SceneError if the scene is invalid, and UsageError as `look` does.
+        """
+        check_of_none(self._checkpoints)
+        check_is_scene(scene)
+        if same_world(scene, self.scene):
+            self.look(scene.camera)
+            return
+        with self._turns.one():
+            self._show(replace(scene, render=self.settings))
+            self._asked_for = None
+            self._begin()
+
+    def _show(self, scene: Scene) -> None:
+        self._compiled, self.scene = self._compiler.compile(scene, self.choices), scene
+        self._progress.session = self._make_picture(self.session.scenes)
+        self.warnings = PictureWarnings(scene, self.compiled.features)
 
     def _see(self) -> None:
         """Switch to the requested camera; if that is interrupted, the next turn does it."""

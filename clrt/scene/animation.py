@@ -1,13 +1,17 @@
-"""Animation of the camera, by keyframes or as a turntable."""
+"""Animation: of the camera, by keyframes or as a turntable, and of a model, as its file defines it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from .fields.limits import Gt, Lt
 from .fields.tuples import tuples_for_lists
 from .materials.textures import NonNegative
+
+if TYPE_CHECKING:
+    from .model import Model
 
 Vector = tuple[float, float, float]
 Positive = Annotated[float, Gt(0)]
@@ -61,4 +65,28 @@ class Animation:
         """Return the number of frames; a frame that falls on the last keyframe is included."""
         if self.turntable_seconds is not None:
             return max(1, round(self.seconds * self.fps))
-        return 1 + int(self.seconds * self.fps * (1 + 1e-9))
+        return frame_count(self.seconds, self.fps)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelAnimation:
+    """Animation of a model file. fps: frames per second; seconds: its duration.
+
+    base: the model as it is in the scene; pose: returns the model at a time in seconds.
+    """
+
+    name: str
+    seconds: float
+    base: Model
+    pose: Callable[[float], Model]
+    fps: Positive = 24.0
+
+    @property
+    def frames(self) -> int:
+        """Return the number of frames, frame 0 at time 0; a frame that falls on the end is included."""
+        return frame_count(self.seconds, self.fps)
+
+
+def frame_count(seconds: float, fps: float) -> int:
+    """Return the number of frames from 0 to `seconds`, both included."""
+    return 1 + int(seconds * fps * (1 + 1e-9))

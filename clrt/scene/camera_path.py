@@ -1,4 +1,4 @@
-"""Static scenes of an animated camera: a turntable or keyframes, frame by frame."""
+"""Static scenes of an animation, frame by frame: a turntable, keyframes of the camera, or a model's animation."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError, UsageError
-from .animation import Animation, Keyframe
+from .animation import Animation, Keyframe, ModelAnimation
 from .model import Camera, Scene
+from .model_pose import posed
 from .splines import Doubles, smooth
 from .validation.field_types import field_problems
 
@@ -33,26 +34,42 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
 def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
     """Return the number and the static scene of all frames, or of the `chosen` ones.
 
-    The scenes differ in their camera alone. Raises SceneError if the scene has no animation or an invalid one,
-    UsageError for an invalid number.
+    With keyframes and turntables the scenes differ in their camera alone. Raises SceneError if the scene has no
+    animation or an invalid one, UsageError for an invalid number.
     """
-    if scene.animation is None:
+    animation = scene.animation
+    if animation is None:
         raise SceneError(
             f"{scene.name}: has no animation; write [[keyframe]] tables, or use a turntable (--turntable, "
             "clrt.turntable)"
         )
-    if problems := (
-        field_problems(Animation, vars(scene.animation), "animation")
-        or animation_problems(scene.camera, scene.animation)
-    ):
+    if problems := _problems(scene.camera, animation):
         raise SceneError(problems)
-    count = scene.animation.frames
+    count = animation.frames
     numbers = range(count) if chosen is None else list(chosen)
     for number in numbers:
         if not 0 <= number < count:
             raise UsageError(f"{scene.name} has no frame {number}; its frames are 0 to {count - 1}")
-    cameras = _cameras(scene.camera, scene.animation, np.array(numbers, np.float64))
+    if isinstance(animation, ModelAnimation):
+        return ((number, posed(scene, animation, number / animation.fps)) for number in numbers)
+    cameras = _cameras(scene.camera, animation, np.array(numbers, np.float64))
     return ((number, replace(scene, camera=camera, animation=None)) for number, camera in zip(numbers, cameras))
+
+
+def _problems(camera: Camera, animation: Animation | ModelAnimation) -> list[str]:
+    if isinstance(animation, ModelAnimation):
+        return field_problems(Animation, {"fps": animation.fps}, "animation") or _length_problems(animation)
+    return field_problems(Animation, vars(animation), "animation") or animation_problems(camera, animation)
+
+
+def _length_problems(animation: Animation | ModelAnimation) -> list[str]:
+    """Return a problem if there are too many frames."""
+    if animation.seconds * animation.fps < MOST_FRAMES:
+        return []
+    return [
+        f"animation: would have {animation.seconds * animation.fps:.9g} frames, more than {MOST_FRAMES}; "
+        "check the times, in seconds, and fps"
+    ]
 
 
 def animation_problems(camera: Camera, animation: Animation) -> list[str]:
@@ -74,12 +91,7 @@ def animation_problems(camera: Camera, animation: Animation) -> list[str]:
         for i in range(len(times) - 1)
         if times[i + 1] <= times[i]
     ]
-    if not problems and animation.seconds * animation.fps >= MOST_FRAMES:
-        problems = [
-            f"animation: would have {animation.seconds * animation.fps:.9g} frames, more than {MOST_FRAMES}; "
-            "check the times, in seconds, and fps"
-        ]
-    return problems or _view_problems(camera, animation)
+    return problems or _length_problems(animation) or _view_problems(camera, animation)
 
 
 def _view_problems(camera: Camera, animation: Animation) -> list[str]:

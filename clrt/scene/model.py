@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ClrtError
-from .animation import Animation
+from .animation import Animation, ModelAnimation
 from .cameras import Camera as Camera
 from .fields.limits import Gt
 from .fields.number_arrays import real_array, whole_array
@@ -86,12 +86,18 @@ class Instance:
 
 @dataclass(eq=False, kw_only=True)
 class Model:
-    """Content of a model file: meshes or instances, at least one, cameras by name in file order, and lights."""
+    """Content of a model file: meshes or instances, at least one, cameras by name in file order, and lights.
+
+    - animation: the file's first one, or the one that was chosen
+    - contents: names of all that can be chosen, by kind: scenes, animations, variants
+    """
 
     meshes: list[Mesh]
     instances: list[Instance] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
     lights: list[Light] = field(default_factory=list)
+    animation: ModelAnimation | None = None
+    contents: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,12 +140,13 @@ class Origin:
 @dataclass(eq=False)
 class Source:
     """Sources of a scene. meshes, instances: tables in their order. files: textures' pictures and environment maps,
-    each with its file. cameras: those of model files."""
+    each with its file. cameras: those of model files. contents: see `Model`."""
 
     meshes: list[Origin] = field(default_factory=list)
     instances: list[Origin] = field(default_factory=list)
     files: list[tuple[object, Path]] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
+    contents: Mapping[str, Sequence[str]] = field(default_factory=dict)
 
     @property
     def paths(self) -> list[Path]:
@@ -159,7 +166,7 @@ class Scene:
     """Everything needed to render an image.
 
     - camera: the one to render; cameras: others by name, including those of model files.
-    - animation: how the camera moves.
+    - animation: how the camera, or a model, moves.
     - materials: the scene file's named ones; meshes and spheres refer to these objects.
     - source: the files that its parts were read from, if any.
     """
@@ -173,6 +180,6 @@ class Scene:
     render: RenderSettings = field(default_factory=RenderSettings)
     name: str = "scene"
     cameras: dict[str, Camera] = field(default_factory=dict)
-    animation: Animation | None = None
+    animation: Animation | ModelAnimation | None = None
     materials: dict[str, Material] = field(default_factory=dict)
     source: Source | None = None

@@ -16,11 +16,14 @@ from .model import Instance, Mesh, Model, Origin, Source
 ARRAYS = ("vertices", "faces", "normals", "uv", "uv1", "colors", "tangents")
 
 
-def source_of_model(path: Path, model: Model, placing: Mapping[str, Any]) -> Source:
-    """Return the source of a bare model, to which the transform keys `placing` of a [[mesh]] were applied."""
-    parts = parts_of(model)
+def source_of_model(path: Path, model: Model, placing: Mapping[str, Any], whole: bool = True) -> Source:
+    """Return the source of a bare model, to which the transform keys `placing` of a [[mesh]] were applied.
+
+    whole: whether a [[mesh]] would read the same, and not another scene or pose of the file.
+    """
+    parts = parts_of(model) if whole else []
     origin = Origin({"file": path.resolve(), **placing}, parts, list(map(material_of, parts)))
-    return Source([origin], cameras=model.cameras)
+    return Source([origin], cameras=model.cameras, contents=model.contents)
 
 
 def parts_of(model: Model) -> list[Mesh | Instance]:

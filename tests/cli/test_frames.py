@@ -21,6 +21,8 @@ from clrt.output.images import read_image
 from clrt.output.video import write_video
 from clrt.scene.camera_path import frames
 
+from ..formats.test_gltf_animations import animated
+
 FLIGHT = """
 camera = { fov_degrees = 50 }
 animation = { fps = 2 }
@@ -73,6 +75,25 @@ def test_each_frame_is_what_a_render_of_its_own_gives(flight: Path) -> None:
         report = json.loads(Path(f"f_{number:04}.json").read_text())
         assert (report["frame"], report["spp"], report["scene_hash"]) == (number, 3, alone.report["scene_hash"])
     assert len({image.pixels.tobytes() for image in images.values()}) == 3
+
+
+def test_frames_of_an_animated_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is the still of --animation-time, at 24 frames per second unless --fps is given; --resume skips them."""
+    monkeypatch.chdir(tmp_path)
+    animated().write(Path("a.glb"))
+    small = "a.glb", "--size", "16x16", "--spp", "2", "--depth", "2"
+    asked = *small, "--animation", "walk", "--frames", "0,2,4", "--fps", "2"
+    written = [f"f_{number}.exr" for number in (0, 2, 4)]
+    assert render(*asked, "-o", "f_#.exr") == written
+    for number in (0, 2, 4):
+        render(*small, "--animation", "walk", "--animation-time", str(number / 2), "-o", "still.exr")
+        np.testing.assert_array_equal(read_image(Path(f"f_{number}.exr")), read_image(Path("still.exr")))
+    assert len({Path(name).read_bytes() for name in written}) == 3
+    Path(written[1]).unlink()
+    assert render(*asked, "-o", "f_#.exr", "--resume") == [written[1]]
+    assert len(render(*small, "--frames", "all", "--fps", "2", "-o", "g_#.png")) == 5
+    failed = CliRunner().invoke(command, [*small, "--frames", "all", "--animation-time", "1"])
+    assert isinstance(failed.exception, clrt.UsageError) and "leave out --frames" in str(failed.exception)
 
 
 def test_resume_makes_what_is_missing(flight: Path) -> None:

@@ -37,6 +37,7 @@ from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.visible_parts import UNSEEN
 from clrt.rendering.render_report import render_report
 from clrt.rendering.renderer_options import choices_of, settings_of
+from clrt.scene.camera_path import turntable
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.materials.material_types import MATERIALS
 from clrt.scene.materials.textures import Picture, Texture
@@ -275,7 +276,7 @@ def test_frames_are_of_one_goal_and_one_view(tmp_path: Path) -> None:
 
     def hash_of(outputs: Outputs, goal: Goal) -> Any:
         sequence = FrameSequence(outputs, (), None, False)
-        sequence._stills = {0: content.camera}
+        sequence._moving, sequence.remaining = turntable(content, 1), 1
         return next(sequence.left(content, Choices(), goal))[0].header["frame_hash"]
 
     first = hash_of(outputs, goal)

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import struct
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ..referenced_files import note_read
+from .resources import read_uri
 from .schema import Accessor, Document, Sparse, entry, parse_document
 
-COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 #: An accessor without a buffer view is all zeros; one larger than this is rejected as malformed.
 MOST_ZEROS = 2**24
@@ -38,19 +35,8 @@ class GltfData:
         self._buffers: dict[int, Bytes] = {}
 
     def resource(self, uri: str, user: str) -> bytes:
-        """Return the content of a URI: data embedded in it, or a file relative to the model."""
-        if uri.startswith("data:"):
-            try:
-                return base64.b64decode(uri.partition(",")[2], validate=True)
-            except (binascii.Error, ValueError):
-                raise SceneError(f"{user}: its data URI is not base64; export the file again") from None
-        try:
-            file = self.path.parent / unquote(uri)
-            if not file.is_file():
-                raise FileNotFoundError
-            return note_read(file).read_bytes()
-        except (OSError, ValueError):
-            raise SceneError(f'{user}: cannot read the file "{unquote(uri)[:200]}"; put it next to the model') from None
+        """Return the content of a URI, see `read_uri`."""
+        return read_uri(self.path, uri, user)
 
     def view(self, index: int, user: str) -> Bytes:
         """Return the bytes of a buffer view."""
@@ -93,7 +79,7 @@ class GltfData:
             values = np.zeros((accessor.count, size), DTYPES[accessor.componentType])
         if accessor.sparse is not None:
             values = self._replaced(values, accessor.sparse, accessor, f"accessor {index}")
-        return _normalised(values) if accessor.normalized else values
+        return normalised(values) if accessor.normalized else values
 
     def _strided(
         self, view: int, offset: int, component: int, shape: tuple[int, int], stride: int | None, user: str
@@ -174,7 +160,7 @@ def split_glb(content: bytes) -> tuple[bytes, bytes | None]:
     return chunks[b"JSON"], chunks.get(b"BIN\0")
 
 
-def _normalised(values: Array) -> Array:
+def normalised(values: Array) -> Array:
     """Convert integers to floats: unsigned 0 … 1, signed −1 … 1 (specification 3.6.2.2)."""
     if not np.issubdtype(values.dtype, np.integer):
         return values

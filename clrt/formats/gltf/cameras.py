@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,28 +14,27 @@ from ...scene.geometry.transform import Matrix, unit
 from ...scene.model import Camera
 from . import schema as gltf
 
-log = logging.getLogger(__name__)
-
 
 def read_cameras(
-    path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix]], middle: NDArray[np.float64]
-) -> dict[str, Camera]:
+    document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix]], middle: NDArray[np.float64]
+) -> tuple[dict[str, Camera], list[str]]:
     """Return the cameras of the scene by name: that of the node, else the camera's own, else "camera N".
 
-    A number is appended to a name in use. The look_at point is as far away as `middle`, (3,). A camera without a view
-    angle or height is left out with a warning.
+    A number is appended to a name in use. The look_at point is as far away as `middle`, (3,). Cameras without a view
+    angle or height are left out; the second value describes them.
     """
     cameras: dict[str, Camera] = {}
+    left_out: list[str] = []
     for node, matrix in nodes:
         if node.camera is None:
             continue
         source = gltf.entry(document.cameras, node.camera, "camera", "a node")
         name = free_name(node.name or source.name or f"camera {node.camera}", cameras)
         if source.perspective is None and (source.orthographic is None or source.orthographic.ymag == 0):
-            log.warning('%s: left out: camera "%s", which has neither an angle nor a height', path, name)
+            left_out.append(f'camera "{name}", which has neither an angle nor a height')
         elif (camera := _placed(source, matrix, middle)) is not None:
             cameras[name] = camera
-    return cameras
+    return cameras, left_out
 
 
 def _placed(source: gltf.Camera, matrix: Matrix, middle: NDArray[np.float64]) -> Camera | None:

@@ -114,13 +114,27 @@ class Volume(Part):
     attenuationColor: Vec3 = (1.0, 1.0, 1.0)
 
 
+class SpecularGlossiness(Part):
+    diffuseFactor: Vec4 = (1.0, 1.0, 1.0, 1.0)
+    diffuseTexture: TextureInfo | None = None
+    specularFactor: Vec3 = (1.0, 1.0, 1.0)
+    glossinessFactor: float = 1.0
+    specularGlossinessTexture: TextureInfo | None = None
+
+
+class Unlit(Part):
+    pass
+
+
 class MaterialExtensions(Part):
     KHR_materials_clearcoat: Clearcoat = Clearcoat()
     KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
     KHR_materials_ior: Ior = Ior()
+    KHR_materials_pbrSpecularGlossiness: SpecularGlossiness | None = None
     KHR_materials_sheen: Sheen = Sheen()
     KHR_materials_specular: Specular = Specular()
     KHR_materials_transmission: Transmission = Transmission()
+    KHR_materials_unlit: Unlit | None = None
     KHR_materials_volume: Volume = Volume()
 
 

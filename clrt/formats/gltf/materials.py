@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -11,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...scene.materials.material_types import Material, MetallicRoughness
+from ...scene.materials.material_types import Diffuse, Material, MetallicRoughness
 from ...scene.materials.textures import Channel, Picture, Texture, Wrap
 from ..images.image_reader import read_texels
 from . import material_schema as looks, schema as gltf
 from .accessors import GltfData
-from .solid_glass import glass
+from .solid_glass import glass, solid_faces, tinted
+from .specular_glossiness import converted, rough_picture
 
 log = logging.getLogger(__name__)
 
@@ -33,49 +35,103 @@ GREY = 0.8
 class Materials:
     """Materials of one file; each image is read once."""
 
-    def __init__(self, data: GltfData) -> None:
-        self._data = data
-        self.names = gltf.material_names(data.document)
+    def __init__(self, data: GltfData, variant: int | None = None) -> None:
+        self._data, self._variant = data, variant
+        self._names = gltf.unique_names("material", [material.name for material in data.document.materials])
         self._pictures: dict[int, Picture | None] = {}
+        self._derived: dict[tuple[int, float], Picture] = {}
         #: Features that had an effect in the file, but are not rendered, by the material's name.
         self.unused: dict[str, list[str]] = {}
 
-    def material(
-        self, primitive: gltf.Primitive, user: str, uv: list[NDArray[np.float32] | None], faces: NDArray[np.int32]
-    ) -> Material:
+    def name(self, primitive: gltf.Primitive) -> str:
+        """Return the name of the primitive's material, empty if it has none."""
+        index = self._index(primitive)
+        return "" if index is None or index >= len(self._names) else self._names[index]
+
+    def _index(self, primitive: gltf.Primitive) -> int | None:
+        """Return the index of the primitive's material, in the chosen variant."""
+        for mapping in primitive.extensions.KHR_materials_variants.mappings:
+            if self._variant in mapping.variants:
+                return mapping.material
+        return primitive.material
+
+    def materials(
+        self,
+        primitive: gltf.Primitive,
+        user: str,
+        uv: list[NDArray[np.float32] | None],
+        faces: NDArray[np.int32],
+        colors: NDArray[np.float32] | None,
+    ) -> list[tuple[Material, NDArray[np.int32]]]:
         """Return the primitive's material with all values clamped to their limits, or the specification's default if it
-        has none. uv, faces: its texture coordinates, both sets, and triangles.
+        has none, and the faces that it is on: those of solid glass have one of their own. uv, faces, colors: the
+        primitive's texture coordinates, both sets, triangles and vertex colors.
 
         A texture is replaced by white if the primitive has no coordinates for it or if it cannot be read; a base color
         texture by grey, an emission texture by black.
         """
-        if primitive.material is None:
-            return MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0)
-        source = gltf.entry(self._data.document.materials, primitive.material, "material", user)
-        pbr = source.pbrMetallicRoughness
+        index = self._index(primitive)
+        if index is None:
+            return [(MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0), faces)]
+        source = converted(gltf.entry(self._data.document.materials, index, "material", user))
+        pbr, extensions = source.pbrMetallicRoughness, source.extensions
         base = self._texture(pbr.baseColorTexture, primitive, user)
-        gloss = self._texture(pbr.metallicRoughnessTexture, primitive, user)
+        coverage = _coverage(source, base, "COLOR_0" in primitive.attributes)
+        color = _colored(_cut(pbr.baseColorFactor[:3]), base, pbr.baseColorTexture, GREY)
+        if extensions.KHR_materials_unlit is not None:
+            self._note(
+                index,
+                {"the variation of vertex colors": colors is not None and bool(np.ptp(colors[:, :3], axis=0).any())},
+            )
+            return [(_unlit(color, colors, coverage), faces)]
         made = MetallicRoughness(
-            color=_colored(_cut(pbr.baseColorFactor[:3]), base, pbr.baseColorTexture, GREY),
-            metallic=_numbered(_unit(pbr.metallicFactor), gloss, "blue"),
-            roughness=_numbered(_unit(pbr.roughnessFactor), gloss, "green"),
+            color=color,
             emission=self._emission(source, primitive, user),
             double_sided=source.doubleSided,
-            **self._layers(source.extensions, primitive, user),
+            **self._gloss(source, primitive, user),
+            **self._layers(extensions, primitive, user),
         )
         made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
-        coverage = _coverage(source, base, "COLOR_0" in primitive.attributes)
-        solid = glass(source.extensions, made, uv, faces)
-        lost = {
-            "alphaMode": coverage.get("opacity", 1.0) != 1,
-            **{layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR")},
+        solid = solid_faces(extensions, made, uv, faces)
+        parts: list[tuple[Material, NDArray[np.int32]]] = []
+        if not solid.all():
+            parts.append((replace(tinted(extensions, made), **coverage), faces[~solid]))
+            volume = extensions.KHR_materials_volume.thicknessFactor > 0
+            self._note(index, {"volume": volume and made.transmission != 0 and made.metallic != 1})
+        if solid.any():
+            parts.append((glass(extensions, made), faces[solid]))
+            layers = {layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR")}
+            self._note(index, {"alphaMode": coverage.get("opacity", 1.0) != 1, **layers})
+        return parts
+
+    def _note(self, index: int, lost: Mapping[str, bool]) -> None:
+        """Note which features of a material are not rendered."""
+        names = [name for name, is_lost in lost.items() if is_lost]
+        if names:
+            noted = self.unused.setdefault(self._names[index], [])
+            noted += [name for name in names if name not in noted]
+
+    def _gloss(self, source: looks.Material, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
+        """Return metallic and roughness."""
+        pbr, old = source.pbrMetallicRoughness, source.extensions.KHR_materials_pbrSpecularGlossiness
+        if old is not None:
+            gloss = self._texture(old.specularGlossinessTexture, primitive, user)
+            if gloss is None:
+                return {"metallic": 0.0, "roughness": pbr.roughnessFactor}
+            picture = self._picture_from(gloss.picture, old.glossinessFactor, rough_picture)
+            return {"metallic": 0.0, "roughness": replace(gloss, picture=picture, channel="green")}
+        texture = self._texture(pbr.metallicRoughnessTexture, primitive, user)
+        return {
+            "metallic": _numbered(_unit(pbr.metallicFactor), texture, "blue"),
+            "roughness": _numbered(_unit(pbr.roughnessFactor), texture, "green"),
         }
-        if solid is None:
-            volume = source.extensions.KHR_materials_volume.thicknessFactor > 0
-            lost = {"volume": volume and made.transmission != 0 and made.metallic != 1}
-        if any(lost.values()):
-            self.unused[self.names[primitive.material]] = [name for name, is_lost in lost.items() if is_lost]
-        return replace(made, **coverage) if solid is None else solid
+
+    def _picture_from(self, picture: Picture, factor: float, make: Callable[[Picture, float], Picture]) -> Picture:
+        """Return an image made of another one, the same for the same factor."""
+        key = id(picture), factor
+        if key not in self._derived:
+            self._derived[key] = make(picture, factor)
+        return self._derived[key]
 
     def _layers(self, extensions: looks.MaterialExtensions, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
         """Return the fields for the extensions in use."""
@@ -105,8 +161,12 @@ class Materials:
         }
 
     def _bend(self, info: looks.NormalTextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
+        """Return a normal map; a negative scale tilts to the other side."""
         texture = self._texture(info, primitive, user)
-        return None if texture is None or info is None else replace(texture, factor=max(info.scale, 0.0))
+        if texture is None or info is None:
+            return None
+        turned = self._picture_from(texture.picture, info.scale, _turned) if info.scale < 0 else texture.picture
+        return replace(texture, picture=turned, factor=abs(info.scale))
 
     def _emission(
         self, source: looks.Material, primitive: gltf.Primitive, user: str
@@ -160,6 +220,24 @@ class Materials:
                 log.warning("%s: a texture is left out: %s", self._data.path, error)
                 self._pictures[index] = None
         return self._pictures[index]
+
+
+def _unlit(
+    color: tuple[float, float, float] | Texture, colors: NDArray[np.float32] | None, coverage: Mapping[str, Any]
+) -> Diffuse:
+    """Return a surface that emits the color from both sides and reflects nothing; colors: vertex colors (n, k)."""
+    if colors is not None:
+        factor = np.array(color.factor if isinstance(color, Texture) else color)
+        red, green, blue = (factor * colors[:, :3].mean(axis=0, dtype=np.float64)).tolist()
+        color = replace(color, factor=(red, green, blue)) if isinstance(color, Texture) else (red, green, blue)
+    return Diffuse(color=(0.0, 0.0, 0.0), emission=color, double_sided=True, **coverage)
+
+
+def _turned(picture: Picture, scale: float) -> Picture:
+    """Return a normal map whose x and y are negated."""
+    texels = picture.texels.copy()
+    texels[..., :2] = 255 - texels[..., :2]
+    return Picture(texels, picture.name)
 
 
 def _coverage(source: looks.Material, base: Texture | None, vertex_colors: bool) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from . import schema as gltf
 from .accessors import GltfData
 
 Floats = NDArray[np.float32]
+VECTORS = {2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 def weights_of(node: gltf.Node, mesh: gltf.Mesh) -> tuple[float, ...]:
@@ -23,7 +24,7 @@ def weights_of(node: gltf.Node, mesh: gltf.Mesh) -> tuple[float, ...]:
 def morphed(
     data: GltfData, primitive: gltf.Primitive, key: str, values: Floats, weights: Sequence[float], user: str
 ) -> Floats:
-    """Return an attribute's values (n, k) with the targets' weighted displacements added to the first three components.
+    """Return an attribute's values (n, k) with the targets' weighted displacements added, in TANGENT without the sign.
 
     Raises SceneError if the numbers of weights and targets, or of displacements and values, differ.
     """
@@ -33,13 +34,14 @@ def morphed(
         raise SceneError(
             f"{user}: has {len(primitive.targets)} morph targets, but {len(weights)} weights; export it again"
         )
+    size = 3 if key == "TANGENT" else values.shape[1]
     moved = values.astype(np.float64)
     for weight, target in zip(weights, primitive.targets):
         if weight and key in target:
-            moves = data.array(target[key], "VEC3", f"{user}, morph target")
+            moves = data.array(target[key], VECTORS[size], f"{user}, morph target")
             if len(moves) != len(values):
                 raise SceneError(
                     f"{user}: a morph target has {len(moves)} of {key} for {len(values)} vertices; export it again"
                 )
-            moved[:, :3] += weight * np.where(np.isfinite(moves), moves, 0)
+            moved[:, :size] += weight * np.where(np.isfinite(moves), moves, 0)
     return moved.astype(np.float32)

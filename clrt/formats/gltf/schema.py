@@ -5,6 +5,7 @@ Imported only when a glTF file is read, since it needs pydantic. Unknown propert
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Annotated, Literal, TypeVar
 
@@ -19,10 +20,23 @@ Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0)]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
+#: Byte order mark, which some exporters write before the JSON text.
+BOM = b"\xef\xbb\xbf"
 #: Supported extensions.
 EXTENSIONS = frozenset(
     f"KHR_materials_{name}"
-    for name in ("clearcoat", "emissive_strength", "ior", "sheen", "specular", "transmission", "volume")
+    for name in (
+        "clearcoat",
+        "emissive_strength",
+        "ior",
+        "pbrSpecularGlossiness",
+        "sheen",
+        "specular",
+        "transmission",
+        "unlit",
+        "variants",
+        "volume",
+    )
 ) | frozenset(
     {
         "EXT_mesh_gpu_instancing",
@@ -32,6 +46,11 @@ EXTENSIONS = frozenset(
         "KHR_mesh_quantization",
         "KHR_texture_transform",
     }
+)
+#: Extensions that change only how surfaces look or move: files that require them are read without.
+OPTIONAL = re.compile(
+    r"[A-Z0-9]+_(materials|texture|lights|animation|audio|interactivity|xmp|node_hoverability|node_selectability|"
+    r"physics|collision|\w*metadata|\w*features)"
 )
 
 
@@ -84,8 +103,18 @@ class Draco(Part):
     attributes: dict[str, Index]
 
 
+class VariantMapping(Part):
+    material: Index
+    variants: list[Index]
+
+
+class VariantMappings(Part):
+    mappings: list[VariantMapping] = []
+
+
 class PrimitiveExtensions(Part):
     KHR_draco_mesh_compression: Draco | None = None
+    KHR_materials_variants: VariantMappings = VariantMappings()
 
 
 class Primitive(Part):
@@ -147,8 +176,17 @@ class NodeExtensions(Part):
     KHR_lights_punctual: UsedLight | None = None
 
 
+class Variant(Part):
+    name: str | None = None
+
+
+class Variants(Part):
+    variants: list[Variant] = []
+
+
 class DocumentExtensions(Part):
     KHR_lights_punctual: Lights = Lights()
+    KHR_materials_variants: Variants = Variants()
 
 
 class Node(Part):
@@ -165,8 +203,36 @@ class Node(Part):
     extensions: NodeExtensions = NodeExtensions()
 
 
+class Skin(Part):
+    joints: Annotated[list[Index], Field(min_length=1)]
+    inverseBindMatrices: Index | None = None
+
+
+class AnimationTarget(Part):
+    path: str
+    node: Index | None = None
+
+
+class AnimationChannel(Part):
+    sampler: Index
+    target: AnimationTarget
+
+
+class AnimationSampler(Part):
+    input: Index
+    output: Index
+    interpolation: str = "LINEAR"
+
+
+class Animation(Part):
+    channels: list[AnimationChannel]
+    samplers: list[AnimationSampler]
+    name: str | None = None
+
+
 class Scene(Part):
     nodes: list[Index] = []
+    name: str | None = None
 
 
 class Document(Part):
@@ -176,6 +242,7 @@ class Document(Part):
     extensionsRequired: list[str] = []
     extensionsUsed: list[str] = []
     accessors: list[Accessor] = []
+    animations: list[Animation] = []
     buffers: list[Buffer] = []
     bufferViews: list[BufferView] = []
     cameras: list[Camera] = []
@@ -186,15 +253,16 @@ class Document(Part):
     scene: Index | None = None
     samplers: list[Sampler] = []
     scenes: list[Scene] = []
+    skins: list[Skin] = []
     textures: list[Texture] = []
     extensions: DocumentExtensions = DocumentExtensions()
 
 
 def parse_document(text: bytes) -> Document:
     """Parse a JSON text. Raises SceneError with every property that the specification does not allow, for a version
-    other than 2, and for a required extension that is not in EXTENSIONS."""
+    other than 2, and for a required extension that is in neither EXTENSIONS nor OPTIONAL."""
     try:
-        document = Document.model_validate_json(text)
+        document = Document.model_validate_json(text.removeprefix(BOM))
     except ValidationError as error:
         details = error.errors(include_url=False)
         raise SceneError(
@@ -202,7 +270,7 @@ def parse_document(text: bytes) -> Document:
         ) from None
     if not document.asset.version.startswith("2."):
         raise SceneError(f'asset.version is "{document.asset.version}"; only glTF 2 is supported, export it as 2.0')
-    missing = sorted(set(document.extensionsRequired) - EXTENSIONS)
+    missing = [name for name in sorted(set(document.extensionsRequired) - EXTENSIONS) if not OPTIONAL.match(name)]
     if missing:
         raise SceneError(f"needs the extension {', '.join(missing)}, which is not supported; export without it")
     return document
@@ -215,12 +283,13 @@ def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
     return items[index]
 
 
-def material_names(document: Document) -> list[str]:
-    """Return a unique name for each material."""
-    names: dict[str, None] = {}
-    for index, source in enumerate(document.materials):
-        names[free_name(source.name or f"material {index}", names)] = None
-    return list(names)
+def unique_names(kind: str, names: Sequence[str | None]) -> list[str]:
+    """Return the names, "KIND N" where there is none, with a number appended to those in use."""
+    unique: dict[str, None] = {}
+    numbers: dict[str, int] = {}
+    for index, name in enumerate(names):
+        unique[free_name(name or f"{kind} {index}", unique, numbers)] = None
+    return list(unique)
 
 
 def _path(location: tuple[int | str, ...]) -> str:

@@ -14,7 +14,7 @@ from .camera_kernel import camera_file
 from .choices import Choices
 from .compile_scene import CompiledScene, compile_scene
 from .reuse_cache import ReuseCache
-from .visible_parts import visible_parts
+from .visible_parts import same_world
 
 #: Settings that affect neither buffers nor programs.
 PASSING = ("size", "spp", "max_depth", "seed", "adaptive")
@@ -68,7 +68,4 @@ class SceneCompiler:
 def _differs_in_passing(scene: Scene, last: Scene) -> bool:
     """Return whether at most the camera and PASSING settings differ."""
     passing = {name: getattr(last.render, name) for name in PASSING}
-    return (
-        all(getattr(scene, name) is getattr(last, name) for name in visible_parts(scene) if name != "camera")
-        and replace(scene.render, **passing) == last.render
-    )
+    return same_world(scene, last) and replace(scene.render, **passing) == last.render

@@ -13,3 +13,8 @@ UNSEEN = {"name", "render", "cameras", "animation", "materials", "source"}
 def visible_parts(scene: Scene) -> list[str]:
     """Return the names of the visible parts of a scene."""
     return [field.name for field in fields(scene) if field.name not in UNSEEN]
+
+
+def same_world(one: Scene, other: Scene) -> bool:
+    """Return whether all visible parts but the camera are the identical objects."""
+    return all(getattr(one, name) is getattr(other, name) for name in visible_parts(one) if name != "camera")

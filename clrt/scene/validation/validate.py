@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError, UsageError
-from ..animation import Animation
+from ..animation import Animation, ModelAnimation
 from ..camera_path import animation_problems
 from ..geometry.instancing import painted
 from ..lights import LIGHTS
@@ -46,7 +46,7 @@ def scene_problems(scene: Scene) -> list[str]:
     if problems := _list_problems(scene):
         return problems
     problems = _camera_problems(scene.camera)
-    if scene.animation is not None:
+    if scene.animation is not None and not isinstance(scene.animation, ModelAnimation):
         problems += _object_problems(scene.animation, Animation, "animation") or (
             [] if problems else animation_problems(scene.camera, scene.animation)
         )

@@ -1,0 +1,56 @@
+"""What is read of a model file that holds several scenes, animations or variants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from math import isfinite
+
+from ..errors import SceneError, UsageError
+from ..scene.validation.field_types import show
+
+Named = str | int
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelChoice:
+    """Parts of a glTF file by name or number; None for the file's default.
+
+    - scene: which of its scenes
+    - animation: which of its animations; None for the pose without any
+    - variant: which of its variants of materials (KHR_materials_variants)
+    - time: in seconds, at which the animation, by default the first one, is read as a still
+    """
+
+    scene: Named | None = None
+    animation: Named | None = None
+    variant: Named | None = None
+    time: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raise UsageError for a time that is not a finite number."""
+        if self.time is not None and not (isinstance(self.time, int | float) and isfinite(self.time)):
+            raise UsageError(f"time is {self.time!r}; give seconds")
+
+    @property
+    def animated(self) -> bool:
+        """Whether an animation poses the model."""
+        return self.animation is not None or self.time is not None
+
+    def given(self) -> list[str]:
+        """Return the names of what is not the default."""
+        return [field.name for field in fields(self) if getattr(self, field.name) is not None]
+
+
+#: The default scene, without animation.
+DEFAULT = ModelChoice()
+
+
+def chosen(wanted: Named, names: Sequence[str], what: str) -> int:
+    """Return the index of the name, else of the number. Raises SceneError that lists the names; what: "animation"."""
+    if wanted in names:
+        return names.index(str(wanted))
+    if str(wanted).isdecimal() and int(wanted) < len(names):
+        return int(wanted)
+    remedy = f"use one of {', '.join(map(show, names))}" if names else f"the file has none; leave {what} out"
+    raise SceneError(f"{what}: {show(wanted)} is unknown; {remedy}")
