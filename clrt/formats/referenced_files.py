@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import logging
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 from ..errors import SceneError
 from ..file_names import printable
 
+log = logging.getLogger(__name__)
 _read: ContextVar[list[Path] | None] = ContextVar("_read", default=None)
 
 
@@ -45,3 +47,35 @@ def check_file(path: Path, what: str) -> None:
     if not path.exists():
         raise SceneError(f"{path}: no such {what} file")
     note_read(path)
+
+
+def find_file(referrer: Path, folders: Iterable[Path], name: str) -> Path | None:
+    """Return the file that the one at `referrer` refers to by `name`; None if there is none.
+
+    It may be quoted and have backslashes. Looked for in each folder, by the whole path, then by the file's name alone,
+    since paths are often those of another computer; then in each folder regardless of letter case, with a warning.
+    """
+    name = name.strip().strip('"').replace("\\", "/")
+    base = name.rsplit("/", 1)[-1]
+    if not base or "\0" in name:
+        return None
+    folders = list(dict.fromkeys(folders))
+    candidates = [folder / each for each in dict.fromkeys((name, base)) for folder in folders]
+    try:
+        if found := next((file for file in candidates if file.is_file()), None):
+            return found
+        for file in candidates:
+            if (found := _any_case(file)) is not None:
+                log.warning("%s: no file %s; using %s", referrer, printable(name), printable(found.name))
+                return found
+    except OSError:  # such as a name that is too long
+        pass
+    return None
+
+
+def _any_case(file: Path) -> Path | None:
+    """Return the file in the same folder whose name differs in letter case only; the first of several."""
+    if not file.parent.is_dir():
+        return None
+    same = (each for each in sorted(file.parent.iterdir()) if each.name.lower() == file.name.lower())
+    return next(filter(Path.is_file, same), None)

@@ -6,7 +6,8 @@ The format: "MTL material format", Wavefront, 1995; PBR keys: Exocortex and Blin
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,7 +17,7 @@ from ...errors import SceneError
 from ...file_names import printable
 from ...scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ...scene.materials.textures import Texture
-from .mtl_maps import Maps, strength
+from .mtl_maps import Kind, Maps, strength
 
 #: Illumination models with mirror reflection, and with refraction.
 MIRRORS, GLASS = {3, 5, 8}, {4, 6, 7, 9}
@@ -25,8 +26,20 @@ BLACK = 0.05
 #: Keys of unsupported layers and effects.
 OTHERS = {"ps": "sheen (Ps)", "pc": "clearcoat (Pc)", "aniso": "anisotropy (aniso)"}
 #: Supported maps.
-MAPS = {"map_kd", "map_ke", "map_d", "map_pr", "map_pm", "norm", "map_kn"}
+MAPS: dict[str, Kind] = {
+    "map_kd": "color",
+    "map_ke": "color",
+    "map_d": "opacity",
+    "map_pr": "number",
+    "map_pm": "number",
+}
+#: Maps of normals, and those of heights, in which exporters also store normals.
+NORMALS, BUMPS = ("norm", "map_kn", "map_norm", "map_normal"), ("map_bump", "bump")
 KEYS = {"kd", "ks", "ke", "ns", "ni", "tf", "tr", "d", "illum", "pr", "pm", *OTHERS}
+
+
+#: In the name of a file a # is no comment.
+COMMENT = re.compile(r"\s#.*")
 
 
 @dataclass
@@ -50,21 +63,37 @@ class MtlMaterial:
     def illumination(self) -> int:
         return int(self.number("illum", 2))
 
+    @property
+    def is_glass(self) -> bool:
+        """Whether light is refracted. Maya writes illum 4 and Ni 1 for all, Blender illum 9 and d for transparency."""
+        blended = self.illumination == 9 and self.number("d", 1.0) < 1 and "tf" not in self.numbers
+        return self.illumination in GLASS and self.number("ni", 1.5) != 1 and not blended
+
+    @property
+    def opacity(self) -> float:
+        """Return d, or else 1 − Tr, or Maya's Tf; but Tr 1, written by programs that take it for d, is opaque."""
+        if "d" in self.numbers:
+            return self.color("d", 1.0)[0]
+        if self.illumination in GLASS and not self.is_glass and "tf" in self.numbers and "tr" not in self.numbers:
+            return sum(self.color("tf", 1.0)) / 3
+        return 1.0 - self.color("tr", 0.0)[0] or 1.0
+
 
 def read_library(text: str) -> dict[str, MtlMaterial]:
     """Return the entries of a library by name. Raises SceneError if a value is not a number."""
     entries: dict[str, MtlMaterial] = {}
     entry = MtlMaterial("")
-    for line in text.splitlines():
-        key, *words = line.split("#")[0].split() or [""]
-        key, rest = key.lower(), " ".join(words)
+    tr = "d" if "meshlab" in text[:500].lower() else "tr"
+    for line in text.split("\n"):
+        key, rest = (line.split(None, 1) + ["", ""])[:2]
+        key = key.lower()
         if key == "newmtl":
-            name = printable(" ".join(line.split()[1:]))  # names may contain #
+            name = printable(" ".join(rest.split()))  # names may contain #
             entry = entries.setdefault(name, MtlMaterial(name))
         elif key.startswith(("map_", "bump", "disp", "decal", "refl", "norm")):
-            entry.maps[key] = rest
-        elif rest and key in KEYS:
-            entry.numbers[key] = _numbers(entry, key, rest)
+            entry.maps[key] = COMMENT.sub("", rest).strip()
+        elif key in KEYS and (rest := rest.split("#")[0].strip()):
+            entry.numbers[tr if key == "tr" else key] = _numbers(entry, key, rest)
     return entries
 
 
@@ -90,16 +119,17 @@ def material(entry: MtlMaterial, maps: Maps) -> Material:
     The roughness follows from the exponent Ns such that GGX is as wide as Blinn's lobe: alpha² = 2/(Ns + 2) (Walter et
     al. 2007). Maps multiply the colors and numbers that they belong to, or 1 if these are missing.
     """
-    found = {key: texture for key, words in entry.maps.items() if key in MAPS and (texture := maps.texture(words))}
+    found = {
+        key: texture for key, words in entry.maps.items() if key in MAPS and (texture := maps.texture(words, MAPS[key]))
+    }
     shared: dict[str, Any] = {"emission": _painted(found.get("map_ke"), entry, "ke", 0.0, math.inf)}
-    if (bend := found.get("norm") or found.get("map_kn")) is not None:
-        shared["normal_map"] = replace(bend, factor=strength(entry.maps.get("norm", entry.maps.get("map_kn", ""))))
+    if (normals := _normal_map(entry, maps)) is not None:
+        shared["normal_map"] = normals
     roughness = (2 / (2 + max(entry.number("ns", 0.0), 0.0))) ** 0.25
-    if entry.illumination in GLASS and not {"pr", "pm"} & entry.numbers.keys():
+    if entry.is_glass and not {"pr", "pm"} & entry.numbers.keys():
         ior = float(np.clip(entry.number("ni", 1.5), 0.25, 4.0))
         return Dielectric(color=entry.color("tf", 1.0), ior=ior, **shared)
-    clear = min(max(1.0 - entry.number("d", 1.0 - entry.number("tr", 0.0)), 0.0), 1.0)
-    shared["opacity"] = _numbered(found.get("map_d"), 1.0 - clear)
+    shared["opacity"] = _numbered(found.get("map_d"), entry.opacity)
     color, specular = _painted(found.get("map_kd"), entry, "kd", 0.8), entry.color("ks", 0.0)
     if {"pr", "pm"} & entry.numbers.keys() or {"map_pr", "map_pm"} & found.keys():
         rough = entry.color("pr", 1.0 if "map_pr" in found else roughness)[0]
@@ -129,8 +159,20 @@ def _numbered(texture: Texture | None, number: float) -> float | Texture:
     return number if texture is None else replace(texture, factor=number)
 
 
-def left_out(entries: Mapping[str, MtlMaterial]) -> list[str]:
-    """Return descriptions of what the entries have that `material` ignores."""
-    maps = sorted({key for entry in entries.values() for key in entry.maps} - MAPS)
+def _normal_map(entry: MtlMaterial, maps: Maps) -> Texture | None:
+    """Return the normal map, which may be where heights belong; maps of heights are ignored."""
+    for key in NORMALS + BUMPS:
+        if key in entry.maps:
+            words = entry.maps[key]
+            texture = maps.texture(words) if key in NORMALS else maps.bump(words)
+            if texture is not None:
+                return replace(texture, factor=strength(words))
+            maps.ignored |= {key} & set(BUMPS)
+    return None
+
+
+def left_out(entries: Mapping[str, MtlMaterial], ignored: Set[str]) -> list[str]:
+    """Return descriptions of what the entries have that `material` ignores. ignored: the bump maps."""
+    maps = sorted({key for entry in entries.values() for key in entry.maps} - {*MAPS, *NORMALS, *BUMPS} | ignored)
     numbers = {key for entry in entries.values() for key in entry.numbers}
     return [f"textures ({', '.join(maps)})"] * bool(maps) + [words for key, words in OTHERS.items() if key in numbers]

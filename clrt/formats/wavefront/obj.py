@@ -1,4 +1,4 @@
-"""Reader for Wavefront OBJ, in array operations if the file is regular: one mesh per material.
+"""Reader for Wavefront OBJ, in array operations: one mesh per material.
 
 The format: "Object Files (.obj)", Wavefront, 1995. Points, lines and free-form surfaces are ignored.
 """
@@ -6,9 +6,10 @@ The format: "Object Files (.obj)", Wavefront, 1995. Points, lines and free-form 
 from __future__ import annotations
 
 import logging
-import re
+from collections.abc import Mapping
+from itertools import accumulate
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,185 +18,173 @@ from ...errors import SceneError
 from ...file_names import printable
 from ...scene.editing import free_name
 from ...scene.materials.material_types import Material
+from ...threads import in_parallel
+from ..polygons import ranges, triangulate
 from ..referenced_files import name_of, note_read
-from .mtl import MtlMaterial, left_out, material, read_library
-from .mtl_maps import Maps
+from .distinct import distinct
+from .libraries import read_libraries
+from .obj_lines import TABLES, Block, Corners, block_ranges, read_block, without
 
 log = logging.getLogger(__name__)
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+#: Colors are up to 255 instead of 1 if one is as large as this.
+BYTE_COLOR = 2
+
+
+class Tables(NamedTuple):
+    """What corners refer to: points (n, 3), texture coordinates (n, 2), normals (n, 3); and the points' colors, (n, 3)
+    with NaN for none, or None."""
+
+    points: Floats
+    uv: Floats
+    normals: Floats
+    colors: Floats | None
 
 
 def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
     """Read meshes by material, with trimesh's names of arrays: vertices (n, 3), faces (m, 3), vertex_normals (n, 3) or
     None, uv (n, 2) or None with v up, vertex_colors (n, 3) or None; and `material`, `material_name`.
 
-    Raises SceneError for malformed lines and for indices out of range.
+    Invalid faces are ignored with a warning. Raises SceneError for other malformed lines, and if all faces are invalid.
     """
-    text = absolute_indices(_text(path).replace("\\\n", " "))
-    points, normals, uv = _table(text, "v", 3), _table(text, "vn", 3), _table(text, "vt", 1)
-    colors = points[:, 3:6] if points.shape[1] >= 6 else None
-    libraries = _libraries(path, text)
-    groups: dict[str, list[str]] = {}
-    pieces = re.split(r"^[ \t]*usemtl\b(.*)$", text, flags=re.MULTILINE) if "usemtl" in text else [text]
-    for name, chunk in zip(["", *pieces[1::2]], pieces[::2]):
-        groups.setdefault(printable(" ".join(name.split())), []).extend(_lines(chunk, "f"))
-    meshes = {}
-    for name, lines in groups.items():
-        if lines:
-            corners, faces = _fans([line.split() for line in lines])
-            triples = _indices(corners, (len(points), len(uv), len(normals)))
-            numbers, triples = _distinct(triples)
-            where = triples.T - 1
-            meshes[name] = {
-                "vertices": points[where[0], :3],
-                "faces": numbers[faces],
-                "vertex_normals": _taken(normals, where[2]),
-                "uv": _taken(uv, where[1]),
-                "vertex_colors": None if colors is None else colors[where[0]],
-                "material": libraries.get(name),
-                "material_name": name,
-            }
+    note_read(path)
+    blocks = in_parallel(lambda limits: read_block(path, *limits), block_ranges(path))
+    points, uv, normals = (_joined([block.tables[key] for block in blocks]) for key in TABLES)
+    tables = Tables(points[:, :3], uv, normals, _colors(points[:, 3:]))
+    used = [name for block in blocks for _, name in block.materials]
+    libraries = [name for block in blocks for name in block.libraries]
+    materials = read_libraries(path, libraries, used)
+    corners, owners = _valid_faces(path, blocks, tables)
+    names, owners = _material_names(["", *used], owners, materials)
+    if materials or not libraries:
+        _warn_of_undefined(path, names, materials)
+    meshes: dict[str, dict[str, Any]] = {}
+    for name, part in zip(names, _split(corners, owners, len(names))):
+        if len(part.sizes):
+            meshes[name] = _mesh(tables, part) | {"material": materials.get(name), "material_name": name}
     if len(meshes) == 1:
         return {name_of(path): mesh for mesh in meshes.values()}
     return {name or free_name(name_of(path), meshes): mesh for name, mesh in meshes.items()}
 
 
-def absolute_indices(text: str) -> str:
-    """Return the text with relative indices (−1 = the latest vertex so far) made absolute."""
-    if not re.search(r"^[ \t]*f.*[ \t/]-", text, re.MULTILINE):
-        return text
-    counts = {"v": 0, "vt": 0, "vn": 0}
-    lines = text.splitlines()
-    for number, line in enumerate(lines):
-        key, *entries = line.split() or [""]
-        if key in counts:
-            counts[key] += 1
-        elif key == "f":
-            corners = [zip(entry.split("/"), counts.values()) for entry in entries]
-            lines[number] = "f " + " ".join(
-                "/".join(_absolute(index, count) for index, count in corner) for corner in corners
-            )
-    return "\n".join(lines)
-
-
-def _absolute(index: str, count: int) -> str:
-    """Return an index that counts from 1; one that is not a number is returned as it is, and reported later."""
-    return str(count + int(index) + 1) if re.fullmatch(r"-\d{1,15}", index) else index
-
-
-def _lines(text: str, key: str) -> list[str]:
-    """Return the rest of the lines that start with `key`, without comments."""
-    return re.findall(rf"^[ \t]*{key}[ \t]+([^#\n]*)", text, re.MULTILINE) if key in text else []
-
-
-def _table(text: str, key: str, least: int) -> Floats:
-    """Return the numbers on the lines of `key`, (n, k): as many as the shortest line has, but at least `least`."""
-    rows = [line.split() for line in _lines(text, key)]
-    if not rows:
-        return np.zeros((0, least))
-    shortest = min(map(len, rows))
-    try:
-        values = np.array(rows if shortest == max(map(len, rows)) else [row[:shortest] for row in rows], np.float64)
-    except ValueError:
-        values = np.zeros((0, 0))
-    if values.ndim != 2 or values.shape[1] < least:
-        raise SceneError(f'a line "{key} {" ".join(_odd(rows, least))[:60]}" needs {least} numbers; repair the file')
-    return values
-
-
-def _odd(rows: list[list[str]], least: int) -> list[str]:
-    """Return the first row without enough numbers."""
-
-    def is_odd(row: list[str]) -> bool:
-        try:
-            return len(list(map(float, row))) < least
-        except ValueError:
-            return True
-
-    return next(filter(is_odd, rows), [])
-
-
-def _fans(polygons: list[list[str]]) -> tuple[list[str], Ints]:
-    """Return all corners, and the indices into them of each triangle, (m, 3); polygons become triangle fans."""
-    sizes = np.array(list(map(len, polygons)))
-    if sizes.min() < 3:
-        odd = " ".join(polygons[int(sizes.argmin())])[:60]
-        raise SceneError(f'a face "f {odd}" has fewer than 3 corners; repair the file')
-    first = np.cumsum(sizes) - sizes
-    polygon = np.repeat(np.arange(len(sizes)), sizes - 2)
-    step = np.arange(len(polygon)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
-    start = first[polygon]
-    return [corner for corners in polygons for corner in corners], np.stack(
-        [start, start + step + 1, start + step + 2], axis=1
-    )
-
-
-def _indices(corners: list[str], counts: tuple[int, int, int]) -> Ints:
-    """Parse each corner's vertex, texture coordinate and normal index, (n, 3), from 1; 0 for none."""
-    slashes = {corner.count("/") for corner in corners}
-    rows = np.zeros((len(corners), 3), np.int64)
-    try:
-        if len(slashes) == 1:
-            numbers = " ".join(corners).replace("//", "/0/").replace("/", " ").split() if slashes != {0} else corners
-            given = np.array(numbers, np.int64).reshape(len(corners), -1)
-            rows[:, : given.shape[1]] = given
-        else:
-            for row, corner in zip(rows, corners):
-                row[: corner.count("/") + 1] = [int(index or 0) for index in corner.split("/")]
-    except (ValueError, OverflowError):
-        raise SceneError("a face has a corner that is not an index; repair the file") from None
-    if (rows[:, 0] == 0).any():
-        raise SceneError("a face uses vertex 0, but OBJ counts from 1; repair the file")
-    for kind, column, count in zip(("vertex", "texture coordinate", "normal"), rows.T, counts):
-        if len(bad := column[(column < 0) | (column > count)]):
-            raise SceneError(f"a face uses {kind} {bad[0]}, but the file has {count}; repair it")
+def _joined(tables: list[Floats]) -> Floats:
+    """Return the rows of tables, with NaN in columns that a table does not have."""
+    width = max((table.shape[1] for table in tables), default=3)
+    rows = np.full((sum(map(len, tables)), width), np.nan)
+    for table, stop in zip(tables, accumulate(map(len, tables))):
+        rows[stop - len(table) : stop, : table.shape[1]] = table
     return rows
 
 
-def _distinct(rows: Ints) -> tuple[Ints, Ints]:
-    """Return each row's index (n,) into the distinct rows, and these, (k, 3)."""
-    keys = rows[:, 0]
-    for column in rows.T[1:]:
-        if column.any():
-            keys = np.unique(keys * (column.max() + 1) + column, return_inverse=True)[1]
-    _, first, numbers = np.unique(keys, return_index=True, return_inverse=True)
-    return numbers, rows[first]
+def _colors(given: Floats) -> Floats | None:
+    """Return colors up to 1 from the numbers after the position, NaN for vertices without; None if all are."""
+    if given.shape[1] < 3 or np.isnan(given[:, 2]).all():
+        return None
+    return given / (255 if np.nanmax(given) >= BYTE_COLOR else 1)
+
+
+def _valid_faces(path: Path, blocks: list[Block], tables: Tables) -> tuple[Corners, Ints]:
+    """Return the corners of all valid faces, and how many `usemtl` lines are before each; warn of the others."""
+    counts = np.array([[len(block.tables[key]) for key in TABLES] for block in blocks]).reshape(-1, 3)
+    corners = _absolute([block.corners for block in blocks], np.cumsum(counts, axis=0) - counts)
+    switches, before = [0], 0
+    for block in blocks:
+        switches += [before + faces for faces, _ in block.materials]
+        before += len(block.corners.sizes)
+    owners = np.repeat(np.arange(len(switches)), np.diff([*switches, before]))
+    for column, table in ((1, tables.uv), (2, tables.normals)):
+        if not len(table):  # exporters may leave them out, but not the indices
+            corners.indices[:, column] = 0
+    wrong = (corners.indices < [1, 0, 0]) | (corners.indices > [len(table) for table in tables[:3]])
+    faults, bad = [block.fault for block in blocks if block.fault], np.zeros(len(corners.sizes), np.bool_)
+    if wrong.any():
+        corner, column = np.argwhere(wrong)[0]
+        faults.append(_range_fault(int(column), int(corners.indices[corner, column]), len(tables[column])))
+        bad = np.logical_or.reduceat(wrong.any(axis=1), np.cumsum(corners.sizes) - corners.sizes)
+    if faults:
+        count = sum(block.bad_faces for block in blocks) + int(bad.sum())
+        if bad.all():
+            raise SceneError(f"{faults[0]}; repair the file")
+        log.warning("%s: %d of its faces are invalid and ignored; the first: %s", path, count, faults[0])
+    return without(bad, corners), owners[~bad]
+
+
+def _absolute(blocks: list[Corners], before: Ints) -> Corners:
+    """Join the corners of blocks. before: the number of elements before each block, (n, 3)."""
+    indices = []
+    for corners, base in zip(blocks, before):
+        if corners.relative is not None:
+            moved = corners.indices + corners.relative * base
+            # Before the first element; 0 would be none for the optional ones.
+            moved[:, 1:] -= corners.relative[:, 1:] & (moved[:, 1:] == 0)
+            indices.append(moved.astype(np.int32))
+        else:
+            indices.append(corners.indices)
+    sizes = [np.zeros(0, np.int64), *(corners.sizes for corners in blocks)]
+    return Corners(np.concatenate([np.zeros((0, 3), np.int32), *indices]), None, np.concatenate(sizes))
+
+
+def _range_fault(column: int, index: int, count: int) -> str:
+    if column == 0 and index == 0:
+        return "a face uses vertex 0, but OBJ counts from 1"
+    return f"a face uses {('vertex', 'texture coordinate', 'normal')[column]} {index}, but the file has {count}"
+
+
+def _material_names(used: list[str], owners: Ints, materials: Mapping[str, Material]) -> tuple[list[str], Ints]:
+    """Return the distinct names of materials, and the number of the one of each face.
+
+    used: the names as they follow in the file; owners: which of them each face has. What follows a # belongs to a name
+    only if there is such a material.
+    """
+    names = [printable(" ".join(name.split())) for name in used]
+    names = [name if name in materials else name.split(" #")[0].rstrip() for name in names]
+    numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
+    return list(numbers), np.array([numbers[name] for name in names])[owners]
+
+
+def _warn_of_undefined(path: Path, names: list[str], materials: Mapping[str, Material]) -> None:
+    missing = sorted(set(names) - materials.keys() - {""})
+    if missing:
+        shown = ", ".join(f'"{name}"' for name in missing[:5]) + f" and {len(missing) - 5} more" * (len(missing) > 5)
+        log.warning("%s: no library defines these materials, which are plain gray: %s", path, shown)
+
+
+def _split(corners: Corners, owners: Ints, count: int) -> list[Corners]:
+    """Return the corners of the faces of each owner, from 0 to `count` − 1, in their order."""
+    if count == 1 or (len(owners) and (owners == owners[0]).all()):
+        nothing = Corners(corners.indices[:0], None, corners.sizes[:0])
+        return [corners if owner in owners[:1] else nothing for owner in range(count)]
+    order = np.argsort(owners, kind="stable")
+    starts, sizes = (np.cumsum(corners.sizes) - corners.sizes)[order], corners.sizes[order]
+    indices = corners.indices[ranges(starts, sizes)]
+    stops = np.searchsorted(owners[order], np.arange(count), "right")
+    corner_stops = np.concatenate([[0], np.cumsum(sizes)])[stops]
+    parts = zip(np.split(indices, corner_stops[:-1]), np.split(sizes, stops[:-1]))
+    return [Corners(part, None, part_sizes) for part, part_sizes in parts]
+
+
+def _mesh(tables: Tables, corners: Corners) -> dict[str, Any]:
+    """Return the arrays of a mesh with one vertex per combination of indices."""
+    triangles = triangulate(tables.points, corners.indices[:, 0] - 1, corners.sizes)
+    numbers, rows = distinct(corners.indices)
+    vertex, uv, normal = rows.T - 1
+    colors = None if tables.colors is None else tables.colors[vertex]
+    if colors is not None and (without_color := np.isnan(colors).any(axis=1)).any():
+        colors = None if without_color.all() else np.where(without_color[:, None], 1.0, colors)
+    return {
+        "vertices": tables.points[vertex],
+        "faces": numbers[triangles],
+        "vertex_normals": _taken(tables.normals, normal),
+        "uv": _taken(tables.uv, uv),
+        "vertex_colors": colors,
+    }
 
 
 def _taken(table: Floats, places: Ints) -> Floats | None:
     """Return rows of a table, zeros at −1; None if all are −1."""
     if (places < 0).all():
         return None
+    if (places >= 0).all():
+        return table[places]
     return np.where(places[:, None] < 0, 0.0, table[places])
-
-
-def _libraries(path: Path, text: str) -> dict[str, Material]:
-    """Read the materials of an OBJ file's libraries; for a missing one, the library named like the OBJ file is read."""
-    entries: dict[str, MtlMaterial] = {}
-    own = path.with_suffix(".mtl")
-    for line in re.findall(r"^[ \t]*mtllib[ \t]+(.*\S)", text, re.MULTILINE):
-        names = [line] if (path.parent / line).is_file() else line.split()
-        for library in (path.parent / name for name in names):
-            if not library.is_file():
-                log.warning(
-                    "%s: no material library %s; %s",
-                    path,
-                    library.name,
-                    f"using {own.name}" if own.is_file() else "its materials are plain gray",
-                )
-                library = own
-            if library.is_file():
-                try:
-                    entries |= read_library(_text(library))
-                except SceneError as error:
-                    raise SceneError([f"{library.name}: {problem}" for problem in error.problems]) from None
-    if names := left_out(entries):
-        log.warning("%s: ignored: %s", path, ", ".join(names))
-    maps = Maps(path)
-    return {name: material(entry, maps) for name, entry in entries.items()}
-
-
-def _text(path: Path) -> str:
-    """Read the file as UTF-8; other bytes become surrogates, as in file names."""
-    return note_read(path).read_text(encoding="utf-8", errors="surrogateescape")

@@ -1,0 +1,152 @@
+"""Numbers in text files, parsed in array operations: eight digits at a time, as the bytes of a 64-bit word.
+
+Method: D. Lemire, "Quickly parsing eight digits", 2018, and W. D. Clinger, "How to read floating point numbers
+accurately", 1990. Words that are not plain decimals are left to Python.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+#: Most digits of a number that are parsed here, in three words of 8 bytes; thus the number of spaces around a text.
+DIGITS, MARGIN = 19, 24
+#: Integers below this, and powers of ten up to this one, are float64 values, so that one division rounds correctly.
+EXACT_INTEGER, EXACT_POWER = 1 << 53, 22
+POWERS = np.array([10**power for power in range(DIGITS + 1)], np.uint64)
+FLOAT_POWERS = 10.0 ** np.arange(EXACT_POWER + 1)
+#: What C libraries print for undefined and infinite values, beyond what `float` accepts.
+NAN, INFINITE = re.compile(rb"[-+]?(nan|1\.#(ind|qnan|snan))"), re.compile(rb"[-+]?1\.#inf")
+
+
+def padded(text: bytes) -> Bytes:
+    """Return lines of text as a writable array, between MARGIN spaces; a missing last line break is added."""
+    margin = b" " * MARGIN
+    end = b"" if not text or text.endswith(b"\n") else b"\n"
+    return np.frombuffer(bytearray(margin + text + end + margin), np.uint8)
+
+
+def words_at(text: Bytes, places: Ints) -> NDArray[np.uint64]:
+    """Return the eight bytes from each place on, the first one in the lowest bits."""
+    words: NDArray[np.uint64] = np.ndarray((len(text) - 7,), "<u8", text, 0, (1,))
+    return words[places]
+
+
+def runs(mask: Flags) -> tuple[Ints, Ints]:
+    """Return the starts and the ends of the runs of True; the first and the last element must be False."""
+    edges = np.flatnonzero(mask[1:] != mask[:-1]) + 1
+    return edges[::2], edges[1::2]
+
+
+def per_line(text: Bytes, starts: Ints) -> Ints:
+    """Return how many of the places `starts`, which ascend, are in each line."""
+    ends = np.flatnonzero(text == ord("\n"))
+    same = max(len(starts) // max(len(ends), 1), 1)
+    first, last = starts[::same], starts[same - 1 :: same]
+    if len(first) == len(last) == len(ends) and (last < ends).all() and (first[1:] > ends[:-1]).all():
+        return np.full(len(ends), same)
+    return np.diff(np.searchsorted(starts, ends), prepend=0)
+
+
+def digits(text: Bytes, ends: Ints, lengths: Ints) -> tuple[NDArray[np.uint64], Flags]:
+    """Parse runs of at most DIGITS decimal digits: their values, and which of them contain other bytes."""
+    values, strange = np.zeros(len(ends), np.uint64), np.zeros(len(ends), np.uint64)
+    longest = int(lengths.max(initial=0))
+    for done in range(0, min(longest, DIGITS), 8):
+        word = words_at(text, ends - (done + 8))
+        word ^= 0x3030303030303030
+        unwanted = 64 - 8 * (lengths if longest <= 8 else np.clip(lengths - done, 0, 8)).astype(np.uint64)
+        word >>= unwanted
+        word <<= unwanted
+        strange |= (word + 0x7676767676767676) | word
+        word = (word * 10 + (word >> 8)) & 0x00FF00FF00FF00FF
+        word = (word * 100 + (word >> 16)) & 0x0000FFFF0000FFFF
+        word = (word * 10000 + (word >> 32)) & 0x00000000FFFFFFFF
+        values += word * POWERS[done] if done else word
+    return values, strange & 0x8080808080808080 != 0
+
+
+def floats(text: Bytes) -> tuple[Floats, Ints, Ints]:
+    """Parse the words between white space: their values, their starts, and the numbers of those that are malformed.
+
+    Values are correctly rounded up to 15 digits, and within one unit of the last place of float64 beyond.
+    """
+    starts, ends = runs(text > ord(" "))
+    stops, exponents, odd = _exponents(text, starts, ends)
+    points = _positions(text == ord("."), starts, stops)
+    first = text[starts]
+    negative = first == ord("-")
+    whole_digits = points - starts - (negative | (first == ord("+")))
+    places = np.maximum(stops - points - 1, 0)
+    count = whole_digits + places
+    odd |= (count < 1) | (count > DIGITS) | (abs(exponents - places) > EXACT_POWER)
+    whole, wrong = digits(text, points, whole_digits)
+    odd |= wrong
+    fraction, wrong = digits(text, stops, places)
+    odd |= wrong
+    mantissas = whole * POWERS[np.minimum(places, DIGITS)] + fraction
+    values = _scaled(mantissas, np.where(odd, 0, exponents - places))
+    np.negative(values, out=values, where=negative)
+    malformed = []
+    for number in np.flatnonzero(odd).tolist():
+        value = _parse(text[starts[number] : ends[number]].tobytes())
+        values[number] = np.nan if value is None else value
+        if value is None:
+            malformed.append(number)
+    return values, starts, np.array(malformed, np.int64)
+
+
+def _exponents(text: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints, Flags]:
+    """Return where each word's mantissa ends, its decimal exponent, and whether that is malformed."""
+    marks = (text | 0x20) == ord("e")
+    if not marks.any():
+        return ends, np.zeros(1, np.int64), np.zeros(len(ends), np.bool_)
+    stops = _positions(marks, starts, ends)
+    sign = text[stops + 1]
+    lengths = np.maximum(ends - stops - 1 - ((sign == ord("-")) | (sign == ord("+"))), 0)
+    values, wrong = digits(text, ends, np.minimum(lengths, DIGITS))
+    exponents = values.astype(np.int64)
+    wrong |= (stops < ends) & ((lengths == 0) | (lengths > 4))
+    return stops, np.where(sign == ord("-"), -exponents, exponents), wrong
+
+
+def _positions(marks: Flags, starts: Ints, stops: Ints) -> Ints:
+    """Return the position of the last mark in each word; its stop if it has none."""
+    where = np.flatnonzero(marks)
+    if len(where) == len(starts) and (where >= starts).all() and (where < stops).all():
+        return where
+    found = stops.copy()
+    word = np.searchsorted(stops, where, "right")
+    where, word = where[word < len(stops)], word[word < len(stops)]
+    inside = where >= starts[word]
+    found[word[inside]] = where[inside]
+    return found
+
+
+def _scaled(mantissas: NDArray[np.uint64], powers: Ints) -> Floats:
+    """Return mantissas times powers of ten, of −EXACT_POWER to EXACT_POWER."""
+    values = mantissas.astype(np.float64)
+    factors = FLOAT_POWERS[abs(powers)]
+    down = powers < 0
+    scaled = np.where(down, values / factors, values * factors)
+    if (long := np.flatnonzero(mantissas >= EXACT_INTEGER)).size:
+        precise, factor = mantissas[long].astype(np.longdouble), factors[long]
+        scaled[long] = np.where(down[long], precise / factor, precise * factor)
+    return scaled
+
+
+def _parse(word: bytes) -> float | None:
+    """Return the value of any number; None if it is not one."""
+    try:
+        return float(word)
+    except ValueError:
+        word = word.lower()
+        infinity = float("-inf" if word.startswith(b"-") else "inf")
+        return float("nan") if NAN.match(word) else infinity if INFINITE.match(word) else None

@@ -1,0 +1,228 @@
+"""The lines of Wavefront OBJ files in array operations, a block of lines at a time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...file_names import printable
+from ..text_numbers import (
+    DIGITS,
+    MARGIN,
+    Bytes,
+    Flags,
+    Floats,
+    Ints,
+    digits,
+    floats,
+    padded,
+    per_line,
+    runs,
+    words_at,
+)
+from .plain_text import plain_text
+
+#: Bytes that are parsed at a time; the arrays are small enough to stay in a core's cache.
+BLOCK = 1 << 18
+#: Lines of numbers: how many they must have, and how many are used; those of a vertex may include a color.
+TABLES = {"v": (3, 6), "vt": (1, 2), "vn": (3, 3)}
+NEWLINE, SPACE, HASH, PLUS, MINUS, SLASH, ZERO = b"\n #+-/0"
+LARGEST_INDEX = np.iinfo(np.int32).max
+
+
+class Corners(NamedTuple):
+    """Corners of polygons. indices: (n, 3) int32, of vertex, texture coordinates and normal, from 1, or 0 for none.
+    relative: whether they count from the block's first one, (n, 3), or None if none do. sizes: corners per polygon."""
+
+    indices: NDArray[np.int32]
+    relative: Flags | None
+    sizes: Ints
+
+
+@dataclass
+class Block:
+    """Contents of a block. tables: numbers by key, (n, k), NaN where a line has fewer. bad_faces: those that are
+    malformed; the first one in words. materials: names, each with the number of faces before it."""
+
+    tables: dict[str, Floats]
+    corners: Corners
+    bad_faces: int
+    fault: str
+    materials: list[tuple[int, str]]
+    libraries: list[str]
+
+
+def block_ranges(path: Path) -> Iterator[tuple[int, int]]:
+    """Yield the start and the end of each block of the file: whole lines, with those that continue them."""
+    with path.open("rb") as file:
+        end, size = 0, os.fstat(file.fileno()).st_size
+        while end < size:
+            start = end
+            file.seek(start + BLOCK)
+            while file.readline().rstrip(b"\r\n").endswith(b"\\"):
+                pass
+            end = min(file.tell(), size)
+            yield start, end
+
+
+def read_block(path: Path, start: int, end: int) -> Block:
+    """Read and parse a block. Raises SceneError for malformed lines of numbers."""
+    with path.open("rb") as file:
+        file.seek(start)
+        lines = _Lines(plain_text(file.read(end - start), first=start == 0))
+    tables = {key: _parse_table(lines.numbers(key), key) for key in TABLES}
+    faces = lines.starting_with("f")
+    corners, bad, fault = _parse_faces(lines.numbers("f"), lambda: lines.counts_before(faces))
+    good = faces.astype(np.int64)
+    good[faces] -= bad
+    before = np.cumsum(good)
+    materials = [(int(before[line]), name) for line, name in lines.named("usemtl")]
+    return Block(tables, corners, int(bad.sum()), fault, materials, [name for _, name in lines.named("mtllib")])
+
+
+class _Lines:
+    """Lines of text without indents."""
+
+    def __init__(self, text: bytes) -> None:
+        self._text = padded(text)
+        self._ends = np.flatnonzero(self._text == NEWLINE)
+        self._starts = np.concatenate([[MARGIN], self._ends + 1])[:-1]
+        self._words = words_at(self._text, self._starts)
+
+    def starting_with(self, key: str) -> Flags:
+        """Return which lines start with this word, of at most 7 characters, and a space."""
+        start = f"{key} ".encode()
+        return self._words & ((1 << 8 * len(start)) - 1) == int.from_bytes(start, "little")
+
+    def numbers(self, key: str) -> Bytes:
+        """Return the lines that start with this word, with spaces in place of the word and of comments."""
+        lines = np.flatnonzero(self.starting_with(key))
+        text, starts = self._extract(lines)
+        for letter in range(len(key)):
+            text[starts + letter] = SPACE
+        if (hashes := text == HASH).any():
+            places = np.arange(len(text))
+            latest_hash = np.maximum.accumulate(np.where(hashes, places, -1))
+            text[latest_hash > np.maximum.accumulate(np.where(text == NEWLINE, places, 0))] = SPACE
+        return text
+
+    def _extract(self, lines: Ints) -> tuple[Bytes, Ints]:
+        """Return the text of these lines between margins, and where each starts in it."""
+        if not len(lines):
+            return padded(b""), lines
+        starts, stops = self._starts[lines], self._ends[lines] + 1
+        if lines[-1] - lines[0] + 1 == len(lines):
+            text = self._text[starts[0] - MARGIN : stops[-1] + MARGIN].copy()
+            text[:MARGIN] = text[-MARGIN:] = SPACE
+            return text, starts - (starts[0] - MARGIN)
+        chosen = np.zeros(len(self._ends) + 2, np.bool_)
+        chosen[lines + 1] = chosen[[0, -1]] = True
+        widths = np.concatenate([[MARGIN], self._ends + 1 - self._starts, [MARGIN]])
+        return self._text[np.repeat(chosen, widths)], MARGIN + np.cumsum(stops - starts) - (stops - starts)
+
+    def named(self, key: str) -> Iterator[tuple[int, str]]:
+        """Yield the lines that start with this word: their numbers, and the rest as text."""
+        for line in np.flatnonzero(self.starting_with(key)).tolist():
+            rest = self._text[self._starts[line] + len(key) : self._ends[line]].tobytes()
+            yield line, rest.decode("utf-8", "surrogateescape").strip()
+
+    def counts_before(self, chosen: Flags) -> Ints:
+        """Return how many lines of each table, (n, 3), come before each of the chosen lines."""
+        return np.stack([np.cumsum(self.starting_with(key))[chosen] for key in TABLES], axis=1)
+
+
+def _parse_table(text: Bytes, key: str) -> Floats:
+    """Return the numbers on lines, (n, k), NaN where a line has fewer than k."""
+    values, starts, malformed = floats(text)
+    counts = per_line(text, starts)
+    least, most = TABLES[key]
+    odd = np.concatenate([np.searchsorted(np.cumsum(counts), malformed, "right"), np.flatnonzero(counts < least)])
+    if odd.size:
+        line = _line(text, int(odd[0]))
+        hint = "write points in decimals" if "," in line else "repair the file"
+        raise SceneError(f'a line "{key} {line}" needs {least} numbers; {hint}')
+    width = int(min(counts.max(initial=least), most))
+    if len(counts) and (counts == counts[0]).all():
+        return values.reshape(len(counts), -1)[:, :width]
+    columns = np.arange(width)
+    places = np.minimum((np.cumsum(counts) - counts)[:, None] + columns, len(values) - 1)
+    return np.where(columns < counts[:, None], values[places], np.nan)
+
+
+def _parse_faces(text: Bytes, counts_before: Callable[[], Ints]) -> tuple[Corners, Flags, str]:
+    """Return the corners of the faces, one per line, which lines are malformed, and what is wrong with the first.
+
+    counts_before: returns the numbers of vertices, texture coordinates and normals before each line.
+    """
+    starts, ends = runs(text - ZERO < 10)
+    lengths = ends - starts
+    values, _ = digits(text, ends, np.minimum(lengths, DIGITS))
+    before = text[starts - 1]
+    signed = (before == MINUS) | (before == PLUS)
+    heads = starts - signed
+    slash = text[heads - 1] == SLASH
+    columns, odd = _columns(text, heads, ends, slash)
+    odd |= (lengths > DIGITS) | (values > LARGEST_INDEX)
+    strange = np.flatnonzero((text - SLASH > 10) & (text > SPACE))
+    if len(strange):
+        strange = np.setdiff1d(strange, heads[signed])
+    no_index = np.searchsorted(np.flatnonzero(text == NEWLINE), np.concatenate([starts[odd], strange]))
+    sizes = per_line(text, starts[~slash])
+    bad = sizes < 3
+    bad[no_index] = True
+    targets, usable = 3 * (np.cumsum(~slash) - 1) + columns, ~odd
+    indices = np.zeros((sizes.sum(), 3), np.int32)
+    indices.reshape(-1)[targets[usable]] = values[usable]
+    relative = None
+    if (negative := usable & (before == MINUS) & (values > 0)).any():
+        relative = np.zeros(indices.shape, np.bool_)
+        relative.reshape(-1)[targets[negative]] = True
+        indices = np.where(relative, np.repeat(counts_before(), sizes, axis=0) + 1 - indices, indices).astype(np.int32)
+    fault = _fault(text, int(bad.argmax()), no_index) if bad.any() else ""
+    return without(bad, Corners(indices, relative, sizes)), bad, fault
+
+
+def _columns(text: Bytes, heads: Ints, ends: Ints, slash: Flags) -> tuple[Ints, Flags]:
+    """Return which of a corner's three indices each number is, and which are preceded by something else than a space
+    or by one or two slashes after a number. slash: whether there is one before the number, which starts at `heads`."""
+    double = slash & (text[heads - 2] == SLASH)
+    after_slash = _shifted(slash)
+    third = double | (slash & after_slash)
+    odd = ~slash & (text[heads - 1] > SPACE)
+    odd |= slash & (heads - np.concatenate([[0], ends[:-1]])[: len(ends)] != 1 + double)
+    odd |= slash & after_slash & (double | _shifted(double | after_slash))
+    return slash + third.astype(np.int64), odd
+
+
+def _shifted(flags: Flags) -> Flags:
+    """Return the flag of the element before each one."""
+    return np.concatenate([[False], flags[:-1]])[: len(flags)]
+
+
+def _fault(text: Bytes, line: int, no_index: Ints) -> str:
+    """Return what is wrong with the face on this line."""
+    face = f'"f {_line(text, line)}"'
+    if line in no_index:
+        return f"a face has a corner that is not an index: {face}"
+    return f"a face {face} has fewer than 3 corners"
+
+
+def without(bad: Flags, corners: Corners) -> Corners:
+    """Return the corners of the other polygons."""
+    if not bad.any():
+        return corners
+    kept = np.repeat(~bad, corners.sizes)
+    relative = None if corners.relative is None else corners.relative[kept]
+    return Corners(corners.indices[kept], relative, corners.sizes[~bad])
+
+
+def _line(text: Bytes, number: int) -> str:
+    """Return the beginning of a line, for messages."""
+    return printable(" ".join(text.tobytes().split(b"\n")[number].decode("utf-8", "surrogateescape").split()))[:60]
