@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 import warnings
 from array import array
@@ -17,6 +18,11 @@ from .header import Element, Header, Property, parse_header
 Array = NDArray[Any]
 #: numpy's types in the notation of `struct`.
 CODES = {"i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f4": "f", "f8": "d"}
+
+_NUMBER = rb"[+-]?(?:\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?|nan|inf|infinity)(?!\S)"
+_NOT_A_NUMBER = re.compile(rb"(?<!\S)(?!" + _NUMBER + rb")\S", re.IGNORECASE)
+#: What is not a number, as Microsoft's libraries print it.
+_WINDOWS_NAN = re.compile(rb"[+-]?(?:nan\(\w*\)|1\.#\w+)", re.IGNORECASE)
 
 
 class Lists(NamedTuple):
@@ -69,9 +75,14 @@ def _as_double(given: Property) -> Property:
 
 def _numbers(text: bytes) -> bytes:
     """Return the doubles that a text consists of, up to its first word that is not a number."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of such a word
-        return np.fromstring(text, np.float64, sep=" ").tobytes()
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", "string or file could not be read")  # older versions of numpy warn
+            return np.fromstring(text, np.float64, sep=" ").tobytes()
+    except (ValueError, DeprecationWarning):
+        text = _WINDOWS_NAN.sub(b"nan", text)
+        odd = _NOT_A_NUMBER.search(text)
+        return np.fromstring(text[: odd.start()] if odd else text, np.float64, sep=" ").tobytes()
 
 
 def _records(content: bytes, start: int, element: Element, order: str) -> tuple[Columns, int]:

@@ -16,7 +16,7 @@ MOST_POINTS = 2_000_000
 TRIANGLES = 4_000_000
 FINEST = 3
 #: Radius of a sphere, as a fraction of the edge of cubes that hold two points each on average.
-FRACTION = 0.4
+FRACTION = 0.35
 #: Bisections of that edge.
 ROUNDS = 20
 
