@@ -70,11 +70,9 @@ def _ply(path: Path) -> dict[str, Any]:
 
 
 def _stl(path: Path) -> dict[str, Any]:
-    from trimesh.exchange.stl import load_stl
+    from .stl import parse_stl
 
-    with path.open("rb") as file:
-        parts: dict[str, Any] = load_stl(file)
-    return parts
+    return parse_stl(path)
 
 
 def _off(path: Path) -> dict[str, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import struct
-import warnings
 from array import array
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ..decimal_text import numbers_in
 from .header import Element, Header, Property, parse_header
 
 Array = NDArray[Any]
@@ -76,13 +76,11 @@ def _as_double(given: Property) -> Property:
 def _numbers(text: bytes) -> bytes:
     """Return the doubles that a text consists of, up to its first word that is not a number."""
     try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("error", "string or file could not be read")  # older versions of numpy warn
-            return np.fromstring(text, np.float64, sep=" ").tobytes()
-    except (ValueError, DeprecationWarning):
+        return numbers_in(text).tobytes()
+    except ValueError:
         text = _WINDOWS_NAN.sub(b"nan", text)
         odd = _NOT_A_NUMBER.search(text)
-        return np.fromstring(text[: odd.start()] if odd else text, np.float64, sep=" ").tobytes()
+        return numbers_in(text[: odd.start()] if odd else text).tobytes()
 
 
 def _records(content: bytes, start: int, element: Element, order: str) -> tuple[Columns, int]:
