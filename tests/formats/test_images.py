@@ -119,12 +119,85 @@ def test_a_sky_is_read_as_its_library_reads_it(tmp_path: Path) -> None:
     for wrong in (
         whole[:-1],
         whole.replace(b"+X 300", b"+X 301"),
-        whole.replace(b"#?RAD", b"#?RAX"),
-        whole.replace(b"FORMAT", b"EXPOSURE=2\nFORMAT"),
+        whole.replace(b"+X 300", b"+X 0"),
+        whole.replace(b"FORMAT=", b"EXPOSURE=0\nFORMAT="),
+        whole.replace(b"FORMAT=", b"COLORCORR=1 2\nFORMAT="),
+        whole.replace(b"rgbe", b"cmyk"),
         whole.replace(b"\x02\x02\x01", b"\x02\x03\x01", 1),
     ):
         path.write_bytes(wrong)
-        assert read_radiance(path) is None
+        with pytest.raises(SceneError, match=r"sky\.hdr: cannot be decoded as an image: "):
+            read_picture(path)
+
+
+@pytest.mark.parametrize("size", ["-Y 5 +X 9", "+Y 5 +X 9", "-Y 5 -X 9", "+Y 5 -X 9"])
+@pytest.mark.parametrize("axes", ["YX", "XY"])
+@pytest.mark.parametrize("coded", ["rows", "pixels", "not"])
+def test_orientations_of_radiance_images(size: str, axes: str, coded: str, tmp_path: Path) -> None:
+    """In all eight the image is upright: the sign of an axis is the direction in which its coordinate changes."""
+    pixels = np.random.default_rng(4).integers(2, 255, (5, 9, 4)).astype(np.uint8)
+    pixels[..., 3] = 129
+    pixels[2, 1:8] = pixels[2, 1]
+    stored_pixels = pixels[:: -1 if "+Y" in size else 1, :: -1 if "-X" in size else 1]
+    if axes == "XY":
+        y, x = size[:4], size[5:]
+        size, stored_pixels = f"{x} {y}", stored_pixels.transpose(1, 0, 2)
+    body = {"rows": by_channel, "pixels": by_pixel, "not": np.ndarray.tobytes}[coded](stored_pixels)
+    head = f"#?RADIANCE\nmade by hand\nFORMAT=32-bit_rle_rgbe\n\n{size}\n"
+    (tmp_path / "a.hdr").write_bytes(head.encode() + body)
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.hdr"), pixels[..., :3] * np.float32(2**-7))
+
+
+def by_channel(pixels: NDArray[np.uint8]) -> bytes:
+    """Rows of runs and literals by channel; those shorter than 8 pixels are not encoded."""
+    width = pixels.shape[1]
+    if width < 8:
+        return pixels.tobytes()
+    rows = b""
+    for row in pixels:
+        rows += bytes((2, 2, 0, width))
+        for plane in row.T.tolist():
+            rows += (
+                bytes((3, *plane[:3], 128 + 2, plane[3], width - 5, *plane[5:]))
+                if plane[3] == plane[4]
+                else bytes((width, *plane))
+            )
+    return rows
+
+
+def by_pixel(pixels: NDArray[np.uint8]) -> bytes:
+    """Runs of equal pixels, as (1, 1, 1, count)."""
+    coded, last, count = b"", b"", 0
+    for pixel in map(bytes, [*pixels.reshape(-1, 4), np.zeros(0, np.uint8)]):
+        if pixel == last:
+            count += 1
+            continue
+        coded += bytes((1, 1, 1, count)) * (count > 0) + pixel
+        last, count = pixel, 0
+    return coded
+
+
+def test_long_runs_of_old_radiance_images(tmp_path: Path) -> None:
+    """Consecutive run counts are the digits of a number to the base 256, the lowest first."""
+    head = b"#?RADIANCE\n\n-Y 2 +X 1000\n"
+    row = bytes((9, 8, 7, 136, 1, 1, 1, 231, 1, 1, 1, 3, 1, 2, 3, 136))  # 1 + 231 + 3·256 = 1000
+    end = bytes((6, 6, 6, 136, 1, 1, 1, 230, 1, 1, 1, 3))
+    (tmp_path / "a.hdr").write_bytes(head + row + end)
+    pixels = read_picture(tmp_path / "a.hdr")
+    assert (pixels[0] == [9, 8, 7]).all() and (pixels[1, 0] == [1, 2, 3]).all() and (pixels[1, 1:] == 6).all()
+
+
+def test_exposures_and_xyz_of_radiance_images(tmp_path: Path) -> None:
+    """Pixels are divided by all exposures and color corrections; XYZ of the white point D65 is white."""
+    pixel = bytes((128, 64, 32, 129))
+    head = (
+        b"#?RADIANCE\r\nEXPOSURE=2\r\nFORMAT=32-bit_rle_rgbe\r\nEXPOSURE= 0.25\r\nCOLORCORR=1 2 4\r\n\r\n-Y 1 +X 1\r\n"
+    )
+    (tmp_path / "a.hdr").write_bytes(head + pixel)
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.hdr"), [[[2, 0.5, 0.125]]])
+    white = bytes((122, 128, 139, 129))  # D65: 0.9505, 1, 1.0891
+    (tmp_path / "b.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n" + white)
+    np.testing.assert_allclose(read_picture(tmp_path / "b.hdr"), [[[1, 1, 1]]], atol=0.02)
 
 
 @pytest.mark.parametrize("mode, dtype", [("L", "u1"), ("LA", "u1"), ("RGB", "u1"), ("RGBA", "u1"), ("RGB", "u2")])

@@ -30,6 +30,11 @@ MOST_RATIO = 2000
 IDLE = 2.0
 
 
+def fits(decoded: int, stored: int) -> bool:
+    """Return whether an image of so many bytes may come from a file of `stored` bytes."""
+    return decoded <= min(MOST_BYTES, max(FREE_BYTES, MOST_RATIO * stored))
+
+
 def picture(file: str) -> Found:
     """Return an image's pixels, (h, w, c) uint8, uint16 or float32 as stored, with unassociated alpha.
 
@@ -45,7 +50,7 @@ def picture(file: str) -> Found:
     spec = buffer.nativespec()
     kind, size = kinds.get(spec.format.basetype, (oiio.FLOAT, 4))
     count = spec.width * spec.height * spec.nchannels * size
-    if count > max(FREE_BYTES, MOST_RATIO * os.path.getsize(file)):
+    if not fits(count, os.path.getsize(file)):
         raise ValueError(f"{os.path.getsize(file)} bytes cannot contain {spec.width}x{spec.height} pixels")
     pixels = buffer.get_pixels(kind) if buffer.read(0, 0, True, kind) else None
     if pixels is None:
