@@ -12,6 +12,7 @@ from pathlib import Path
 
 import imageio.v3 as imageio
 import numpy as np
+import OpenEXR
 import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
@@ -91,10 +92,107 @@ def test_alpha_does_not_darken_a_png(tmp_path: Path) -> None:
     assert read_picture(tmp_path / "a.png") == pytest.approx(((118 / 255 + 0.055) / 1.055) ** 2.4, rel=1e-6)
 
 
-def test_a_cropped_picture_is_refused(tmp_path: Path) -> None:
-    stored(tmp_path / "crop.exr", noise(21, 34, 3), full_width=50, full_height=40)
-    with pytest.raises(SceneError, match=r"crop\.exr: the file contains 34x21 pixels of a 50x40 image"):
-        read_picture(tmp_path / "crop.exr")
+@pytest.mark.parametrize("left, top", [(3, 2), (-3, 2), (0, -4), (30, 1)])
+def test_data_windows(left: int, top: int, tmp_path: Path) -> None:
+    """Pixels are placed in the display window, black where there are none, and cut where they exceed it."""
+    pixels = noise(7, 9, 3) + 1
+    stored(tmp_path / "a.exr", pixels, x=left, y=top, full_x=0, full_y=0, full_width=12, full_height=8)
+    expected = np.zeros((8, 12, 3), np.float32)
+    for y, x in np.ndindex(7, 9):
+        if 0 <= y + top < 8 and 0 <= x + left < 12:
+            expected[y + top, x + left] = pixels[y, x]
+    if expected.any():
+        np.testing.assert_array_equal(read_picture(tmp_path / "a.exr"), expected)
+        return
+    with pytest.raises(SceneError, match="its data window is outside its display window"):
+        read_picture(tmp_path / "a.exr")
+
+
+def exr(path: Path, *parts: tuple[str, dict[str, NDArray[np.generic]]], kind: object = OpenEXR.scanlineimage) -> Path:
+    """Write parts by name, each with channels by name, as OpenEXR's own library does."""
+    header = {"type": kind, "tiles": OpenEXR.TileDescription()} if kind == OpenEXR.tiledimage else {"type": kind}
+    OpenEXR.File([OpenEXR.Part({**header, "name": name}, dict(channels)) for name, channels in parts]).write(str(path))
+    return path
+
+
+def test_layers_and_parts_of_exr_files(tmp_path: Path) -> None:
+    """The layer of the whole image is read, or the only one of colors; several others are an error that names them."""
+    plain = dict(zip("RGB", noise(3, 4, 5)))
+    other = {name: values + 1 for name, values in plain.items()}
+    depth = {"Z": noise(4, 5)}
+    pixels = np.stack(list(plain.values()), axis=-1)
+
+    def layer(name: str, channels: dict[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:
+        return {f"{name}.{channel}": values for channel, values in channels.items()}
+
+    for number, parts in enumerate(
+        [
+            [("main", layer("diffuse", plain))],
+            [("main", {**layer("diffuse", other), **layer("View Layer.Combined", plain), "Z": depth["Z"]})],
+            [("main", {**layer("diffuse", other), **plain})],
+            [("depth", depth), ("diffuse", other), ("beauty", plain)],
+            [("depth", depth), ("whatever", plain)],
+            [("right", other), ("left", plain)],
+        ]
+    ):
+        np.testing.assert_array_equal(read_picture(exr(tmp_path / f"{number}.exr", *parts)), pixels)
+    both = exr(tmp_path / "both.exr", ("main", {**layer("diffuse", plain), **layer("specular", other)}))
+    for file in (both, exr(tmp_path / "parts.exr", ("specular", other), ("diffuse", plain))):
+        with pytest.raises(SceneError, match="has color layers diffuse, specular; save one of them alone"):
+            read_picture(file)
+
+
+def test_channel_types_of_exr_files(tmp_path: Path) -> None:
+    """Integers are their values, in any channel; half floats and tiles are read like others."""
+    numbers = np.arange(20, dtype=np.uint32).reshape(4, 5) * 1000
+    file = exr(tmp_path / "a.exr", ("main", {name: numbers + i for i, name in enumerate("RGB")}))
+    np.testing.assert_array_equal(read_picture(file), np.stack([numbers, numbers + 1, numbers + 2], axis=-1))
+    half = {name: values.astype(np.float16) for name, values in zip("RGB", noise(3, 4, 5))}
+    for kind in (OpenEXR.scanlineimage, OpenEXR.tiledimage):
+        file = exr(tmp_path / "b.exr", ("main", {**half, "id": numbers}), kind=kind)
+        np.testing.assert_array_equal(read_picture(file), np.stack(list(half.values()), axis=-1).astype(np.float32))
+
+
+def test_luminance_of_exr_files(tmp_path: Path) -> None:
+    """Y alone is grey, also with alpha; with chroma, subsampled or not, it is refused by name."""
+    grey = noise(4, 6)
+    alpha = np.ones_like(grey)
+    np.testing.assert_array_equal(
+        read_picture(exr(tmp_path / "y.exr", ("main", {"A": alpha, "Y": grey})))[..., 2], grey
+    )
+    exr(tmp_path / "full.exr", ("main", {"Y": grey, "RY": grey, "BY": grey}))
+    (tmp_path / "half.exr").write_bytes(subsampled(grey))
+    for name in ("full.exr", "half.exr"):
+        with pytest.raises(SceneError, match=f"{name}: contains luminance and chroma, the channels Y, RY and BY"):
+            read_picture(tmp_path / name)
+
+
+def subsampled(grey: FloatArray) -> bytes:
+    """Return an uncompressed OpenEXR file of luminance, with chroma for every fourth pixel (OpenEXR File Layout)."""
+    height, width = grey.shape
+
+    def attribute(name: str, kind: str, value: bytes) -> bytes:
+        return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    sampling = (("BY", 2), ("RY", 2), ("Y", 1))
+    channels = b"".join(name.encode() + b"\0" + struct.pack("<iB3xii", 2, 0, step, step) for name, step in sampling)
+    head = (
+        struct.pack("<ii", 20000630, 2)
+        + attribute("channels", "chlist", channels + b"\0")
+        + attribute("compression", "compression", b"\0")
+        + attribute("dataWindow", "box2i", window)
+        + attribute("displayWindow", "box2i", window)
+        + attribute("lineOrder", "lineOrder", b"\0")
+        + attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+        + attribute("screenWindowCenter", "v2f", bytes(8))
+        + attribute("screenWindowWidth", "float", struct.pack("<f", 1))
+        + b"\0"
+    )
+    rows = [bytes(4 * width if y % 2 == 0 else 0) + grey[y].tobytes() for y in range(height)]
+    lines = [struct.pack("<ii", y, len(row)) + row for y, row in enumerate(rows)]
+    starts = np.cumsum([len(head) + 8 * height, *map(len, lines)])[:-1]
+    return head + starts.astype("<u8").tobytes() + b"".join(lines)
 
 
 def test_a_folder_is_no_picture(tmp_path: Path) -> None:
