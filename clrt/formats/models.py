@@ -76,11 +76,9 @@ def _stl(path: Path) -> dict[str, Any]:
 
 
 def _off(path: Path) -> dict[str, Any]:
-    from trimesh.exchange.off import load_off
+    from .off import parse_off
 
-    with path.open("rb") as file:
-        parts: dict[str, Any] = load_off(file)
-    return parts
+    return parse_off(path)
 
 
 def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals], Model]:

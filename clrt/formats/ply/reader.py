@@ -16,10 +16,10 @@ from ...scene.materials.textures import Picture, Texture
 from ...scene.validation.validate import index_problems
 from ..images.image_reader import read_texels
 from ..referenced_files import name_of
-from .attributes import Array, colors_of, columns_of, coordinates_of
-from .elements import read_elements
+from ..seams import with_corner_attributes
+from .attributes import Array, colors_of, columns_of, coordinates_of, corner_coordinates
+from .elements import Columns, Lists, read_elements
 from .points import point_spheres
-from .seams import with_face_attributes
 from .triangles import Fans, faces_of, strip_triangles
 
 log = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ def parse_ply(path: Path) -> dict[str, Any]:
     }
     textures = np.zeros(len(faces), np.int64)
     if found is not None and fans is not None:
-        whole = with_face_attributes(whole, *found, fans)
+        whole = with_corner_attributes(whole, _of_corners(*found, fans, whole["vertex_colors"] is None))
         if "texnumber" in found[0].scalars:
             textures = found[0].scalars["texnumber"].astype(np.int64)[fans.polygons]
     return {"geometry": _by_texture(path, header.comments, whole, textures)}
@@ -68,6 +68,16 @@ def _finite_where_unused(points: Array, faces: Array) -> Array:
     bad[faces] = False
     points[bad] = points[faces[0, 0]]
     return points
+
+
+def _of_corners(face: Columns, polygons: Lists, fans: Fans, with_colors: bool) -> dict[str, Array]:
+    """Return the texture coordinates and colors that faces have, by corner of the triangles."""
+    of_corners: dict[str, Array] = {}
+    if (uv := corner_coordinates(face, polygons)) is not None:
+        of_corners["uv"] = uv[fans.corners.ravel()]
+    if with_colors and (colors := colors_of(face)) is not None:
+        of_corners["vertex_colors"] = np.repeat(colors[fans.polygons], 3, axis=0)
+    return of_corners
 
 
 def _by_texture(path: Path, comments: Sequence[str], whole: dict[str, Any], numbers: Array) -> dict[str, Any]:

@@ -1,32 +1,25 @@
-"""Attributes of faces, for which vertices are split along seams."""
+"""Splitting of vertices whose faces differ in texture coordinates or colors."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .attributes import Array, colors_of, corner_coordinates
-from .elements import Columns, Lists
-from .triangles import Fans
+Array = NDArray[Any]
 
 
-def with_face_attributes(whole: dict[str, Any], face: Columns, polygons: Lists, fans: Fans) -> dict[str, Any]:
-    """Return the arrays with the texture coordinates and colors of faces, if they have any; vertices whose faces differ
-    in them are split."""
-    uv = corner_coordinates(face, polygons)
-    colors = None if whole["vertex_colors"] is not None else colors_of(face)
-    of_corners: dict[str, Array] = {}
-    if uv is not None:
-        of_corners["uv"] = uv[fans.corners.ravel()]
-    if colors is not None:
-        of_corners["vertex_colors"] = np.repeat(colors[fans.polygons], 3, axis=0)
+def with_corner_attributes(whole: Mapping[str, Any], of_corners: Mapping[str, Array]) -> dict[str, Any]:
+    """Return a mesh, trimesh's names of arrays, with attributes by corner of its faces, (3m, k) each, in place of those
+    by vertex; vertices whose corners differ in them are split."""
     if not of_corners:
-        return whole
-    faces, corner = _split(fans.vertices.ravel(), len(whole["vertices"]), np.column_stack(list(of_corners.values())))
+        return dict(whole)
+    vertices, count = np.ravel(whole["faces"]), len(whole["vertices"])
+    faces, corner = _split(vertices, count, np.column_stack(list(of_corners.values())))
     old = np.arange(len(corner))
-    old[len(whole["vertices"]) :] = fans.vertices.ravel()[corner[len(whole["vertices"]) :]]
+    old[count:] = vertices[corner[count:]]
     split = {name: None if values is None else values[old] for name, values in whole.items() if name != "faces"}
     return split | {name: values[corner] for name, values in of_corners.items()} | {"faces": faces.reshape(-1, 3)}
 
@@ -39,10 +32,7 @@ def _split(vertices: Array, count: int, attributes: NDArray[np.float32]) -> tupl
     """
     last = np.zeros(count, np.int64)
     last[vertices] = np.arange(len(vertices))
-    seam = np.zeros(len(vertices), np.bool_)
-    for column in attributes.T:
-        seam |= column != column[last[vertices]]
-    others = np.flatnonzero(seam)
+    others = np.flatnonzero(np.any([column != column[last[vertices]] for column in attributes.T], axis=0))
     keys = vertices[others].astype(np.int64)
     for column in attributes[others].T:
         values = np.unique(column, return_inverse=True)[1]
