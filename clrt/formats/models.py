@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,12 +21,12 @@ from ..errors import SceneError
 from ..file_names import StrPath
 from ..scene.geometry.instancing import baked
 from ..scene.geometry.normals import Normals, choose_normals
+from ..scene.materials.material import BELOW_ONE
 from ..scene.materials.material_types import Diffuse
 from ..scene.model import Mesh, Model
-from ..scene.validation.validate import index_problems, mesh_problems
+from ..scene.validation.validate import mesh_problems
 from .images.image_reader import linear_from_srgb
 from .model_choice import DEFAULT, ModelChoice
-from .ply import plain_ply
 from .referenced_files import check_file, name_of
 
 log = logging.getLogger(__name__)
@@ -70,29 +71,21 @@ def _obj(path: Path) -> dict[str, Any]:
 
 
 def _ply(path: Path) -> dict[str, Any]:
-    if plain := plain_ply(path):
-        return plain
-    from trimesh.exchange.ply import load_ply
+    from .ply.reader import parse_ply
 
-    with path.open("rb") as file:
-        parts: dict[str, Any] = load_ply(file, skip_materials=True)
-    return parts
+    return parse_ply(path)
 
 
 def _stl(path: Path) -> dict[str, Any]:
-    from trimesh.exchange.stl import load_stl
+    from .stl import parse_stl
 
-    with path.open("rb") as file:
-        parts: dict[str, Any] = load_stl(file)
-    return parts
+    return parse_stl(path)
 
 
 def _off(path: Path) -> dict[str, Any]:
-    from trimesh.exchange.off import load_off
+    from .off import parse_off
 
-    with path.open("rb") as file:
-        parts: dict[str, Any] = load_off(file)
-    return parts
+    return parse_off(path)
 
 
 def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals], Model]:
@@ -147,9 +140,7 @@ def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
     several = parts.get("geometry", {stem: parts})
     pieces = {name: piece for name, piece in several.items() if _size(piece.get("faces"))}
     if not pieces:
-        raise SceneError(
-            "contains no triangles (points, lines and PLY strips are not supported); export a triangle mesh"
-        )
+        raise SceneError("contains no triangles (points and lines are ignored); export a triangle mesh")
     meshes, problems = [], []
     for name, piece in pieces.items():
         try:
@@ -169,7 +160,8 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
             stored = piece.get("vertex_normals")
             stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
             uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
-        faces = _triangles(np.asarray(piece["faces"], np.int64), name)
+        faces = np.asarray(piece["faces"])
+        faces = _triangles(faces if np.issubdtype(faces.dtype, np.integer) else faces.astype(np.int64), name)
     except (TypeError, ValueError):
         raise SceneError(f'mesh "{name}": its lines have different numbers of values; export it again') from None
     colors = _linear_colors(piece.get("vertex_colors"))
@@ -178,17 +170,18 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
     if uv is None and material.textures():
         log.warning('mesh "%s" has no texture coordinates; the textures of its material are ignored', name)
         material = material.without_textures()
+    if colors is not None and colors.shape[1] == 4 and material.opacity == 1:
+        material = replace(material, opacity=BELOW_ONE)
     mesh = Mesh(
         vertices,
-        faces.astype(np.int32),
+        faces,
         material,
         name=name,
         material_name=piece.get("material_name", ""),
         uv=uv,
         colors=colors,
     )
-    problems = index_problems(faces, len(vertices), f'mesh "{name}"') or mesh_problems(mesh, "mesh")
-    if problems:
+    if problems := mesh_problems(mesh, "mesh"):
         raise SceneError(problems)
     mesh.normals = choose_normals(normals, vertices, mesh.faces, stored)
     return mesh
@@ -201,15 +194,19 @@ def _downward(uv: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _linear_colors(colors: Any) -> NDArray[np.float32] | None:
-    """Convert these formats' vertex colors, sRGB-encoded and up to 255 if integers, to linear."""
+    """Convert these formats' vertex colors, sRGB-encoded and up to 255 if integers, to linear; alpha is kept if some
+    vertices are transparent, but not all, as some exporters leave it at 0."""
     if colors is None:
         return None
     given = np.asarray(colors)
-    encoded = np.asarray(given / (255 if np.issubdtype(given.dtype, np.integer) else 1), np.float32)[:, :3]
-    return linear_from_srgb(np.nan_to_num(encoded).clip(0, 1))
+    encoded = np.asarray(given / (255 if np.issubdtype(given.dtype, np.integer) else 1), np.float32)
+    encoded = np.nan_to_num(encoded).clip(0, 1)
+    linear = linear_from_srgb(encoded[:, :3])
+    alpha = encoded[:, 3:4]
+    return np.concatenate([linear, alpha], axis=1) if alpha.any() and (alpha < 1).any() else linear
 
 
-def _triangles(polygons: NDArray[np.int64], name: str) -> NDArray[np.int64]:
+def _triangles(polygons: NDArray[np.integer], name: str) -> NDArray[np.integer]:
     """Split polygons of k corners, (m, k), into fans of k − 2 triangles."""
     if polygons.ndim != 2 or polygons.shape[1] < 3:
         raise SceneError(f'mesh "{name}": its faces have fewer than 3 corners; export triangles')

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import imageio.v3 as imageio
 import numpy as np
+import OpenEXR
 import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
@@ -91,10 +92,107 @@ def test_alpha_does_not_darken_a_png(tmp_path: Path) -> None:
     assert read_picture(tmp_path / "a.png") == pytest.approx(((118 / 255 + 0.055) / 1.055) ** 2.4, rel=1e-6)
 
 
-def test_a_cropped_picture_is_refused(tmp_path: Path) -> None:
-    stored(tmp_path / "crop.exr", noise(21, 34, 3), full_width=50, full_height=40)
-    with pytest.raises(SceneError, match=r"crop\.exr: the file contains 34x21 pixels of a 50x40 image"):
-        read_picture(tmp_path / "crop.exr")
+@pytest.mark.parametrize("left, top", [(3, 2), (-3, 2), (0, -4), (30, 1)])
+def test_data_windows(left: int, top: int, tmp_path: Path) -> None:
+    """Pixels are placed in the display window, black where there are none, and cut where they exceed it."""
+    pixels = noise(7, 9, 3) + 1
+    stored(tmp_path / "a.exr", pixels, x=left, y=top, full_x=0, full_y=0, full_width=12, full_height=8)
+    expected = np.zeros((8, 12, 3), np.float32)
+    for y, x in np.ndindex(7, 9):
+        if 0 <= y + top < 8 and 0 <= x + left < 12:
+            expected[y + top, x + left] = pixels[y, x]
+    if expected.any():
+        np.testing.assert_array_equal(read_picture(tmp_path / "a.exr"), expected)
+        return
+    with pytest.raises(SceneError, match="its data window is outside its display window"):
+        read_picture(tmp_path / "a.exr")
+
+
+def exr(path: Path, *parts: tuple[str, dict[str, NDArray[np.generic]]], kind: object = OpenEXR.scanlineimage) -> Path:
+    """Write parts by name, each with channels by name, as OpenEXR's own library does."""
+    header = {"type": kind, "tiles": OpenEXR.TileDescription()} if kind == OpenEXR.tiledimage else {"type": kind}
+    OpenEXR.File([OpenEXR.Part({**header, "name": name}, dict(channels)) for name, channels in parts]).write(str(path))
+    return path
+
+
+def test_layers_and_parts_of_exr_files(tmp_path: Path) -> None:
+    """The layer of the whole image is read, or the only one of colors; several others are an error that names them."""
+    plain = dict(zip("RGB", noise(3, 4, 5)))
+    other = {name: values + 1 for name, values in plain.items()}
+    depth = {"Z": noise(4, 5)}
+    pixels = np.stack(list(plain.values()), axis=-1)
+
+    def layer(name: str, channels: dict[str, NDArray[np.float32]]) -> dict[str, NDArray[np.float32]]:
+        return {f"{name}.{channel}": values for channel, values in channels.items()}
+
+    for number, parts in enumerate(
+        [
+            [("main", layer("diffuse", plain))],
+            [("main", {**layer("diffuse", other), **layer("View Layer.Combined", plain), "Z": depth["Z"]})],
+            [("main", {**layer("diffuse", other), **plain})],
+            [("depth", depth), ("diffuse", other), ("beauty", plain)],
+            [("depth", depth), ("whatever", plain)],
+            [("right", other), ("left", plain)],
+        ]
+    ):
+        np.testing.assert_array_equal(read_picture(exr(tmp_path / f"{number}.exr", *parts)), pixels)
+    both = exr(tmp_path / "both.exr", ("main", {**layer("diffuse", plain), **layer("specular", other)}))
+    for file in (both, exr(tmp_path / "parts.exr", ("specular", other), ("diffuse", plain))):
+        with pytest.raises(SceneError, match="has color layers diffuse, specular; save one of them alone"):
+            read_picture(file)
+
+
+def test_channel_types_of_exr_files(tmp_path: Path) -> None:
+    """Integers are their values, in any channel; half floats and tiles are read like others."""
+    numbers = np.arange(20, dtype=np.uint32).reshape(4, 5) * 1000
+    file = exr(tmp_path / "a.exr", ("main", {name: numbers + i for i, name in enumerate("RGB")}))
+    np.testing.assert_array_equal(read_picture(file), np.stack([numbers, numbers + 1, numbers + 2], axis=-1))
+    half = {name: values.astype(np.float16) for name, values in zip("RGB", noise(3, 4, 5))}
+    for kind in (OpenEXR.scanlineimage, OpenEXR.tiledimage):
+        file = exr(tmp_path / "b.exr", ("main", {**half, "id": numbers}), kind=kind)
+        np.testing.assert_array_equal(read_picture(file), np.stack(list(half.values()), axis=-1).astype(np.float32))
+
+
+def test_luminance_of_exr_files(tmp_path: Path) -> None:
+    """Y alone is grey, also with alpha; with chroma, subsampled or not, it is refused by name."""
+    grey = noise(4, 6)
+    alpha = np.ones_like(grey)
+    np.testing.assert_array_equal(
+        read_picture(exr(tmp_path / "y.exr", ("main", {"A": alpha, "Y": grey})))[..., 2], grey
+    )
+    exr(tmp_path / "full.exr", ("main", {"Y": grey, "RY": grey, "BY": grey}))
+    (tmp_path / "half.exr").write_bytes(subsampled(grey))
+    for name in ("full.exr", "half.exr"):
+        with pytest.raises(SceneError, match=f"{name}: contains luminance and chroma, the channels Y, RY and BY"):
+            read_picture(tmp_path / name)
+
+
+def subsampled(grey: FloatArray) -> bytes:
+    """Return an uncompressed OpenEXR file of luminance, with chroma for every fourth pixel (OpenEXR File Layout)."""
+    height, width = grey.shape
+
+    def attribute(name: str, kind: str, value: bytes) -> bytes:
+        return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+
+    window = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    sampling = (("BY", 2), ("RY", 2), ("Y", 1))
+    channels = b"".join(name.encode() + b"\0" + struct.pack("<iB3xii", 2, 0, step, step) for name, step in sampling)
+    head = (
+        struct.pack("<ii", 20000630, 2)
+        + attribute("channels", "chlist", channels + b"\0")
+        + attribute("compression", "compression", b"\0")
+        + attribute("dataWindow", "box2i", window)
+        + attribute("displayWindow", "box2i", window)
+        + attribute("lineOrder", "lineOrder", b"\0")
+        + attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+        + attribute("screenWindowCenter", "v2f", bytes(8))
+        + attribute("screenWindowWidth", "float", struct.pack("<f", 1))
+        + b"\0"
+    )
+    rows = [bytes(4 * width if y % 2 == 0 else 0) + grey[y].tobytes() for y in range(height)]
+    lines = [struct.pack("<ii", y, len(row)) + row for y, row in enumerate(rows)]
+    starts = np.cumsum([len(head) + 8 * height, *map(len, lines)])[:-1]
+    return head + starts.astype("<u8").tobytes() + b"".join(lines)
 
 
 def test_a_folder_is_no_picture(tmp_path: Path) -> None:
@@ -119,12 +217,85 @@ def test_a_sky_is_read_as_its_library_reads_it(tmp_path: Path) -> None:
     for wrong in (
         whole[:-1],
         whole.replace(b"+X 300", b"+X 301"),
-        whole.replace(b"#?RAD", b"#?RAX"),
-        whole.replace(b"FORMAT", b"EXPOSURE=2\nFORMAT"),
+        whole.replace(b"+X 300", b"+X 0"),
+        whole.replace(b"FORMAT=", b"EXPOSURE=0\nFORMAT="),
+        whole.replace(b"FORMAT=", b"COLORCORR=1 2\nFORMAT="),
+        whole.replace(b"rgbe", b"cmyk"),
         whole.replace(b"\x02\x02\x01", b"\x02\x03\x01", 1),
     ):
         path.write_bytes(wrong)
-        assert read_radiance(path) is None
+        with pytest.raises(SceneError, match=r"sky\.hdr: cannot be decoded as an image: "):
+            read_picture(path)
+
+
+@pytest.mark.parametrize("size", ["-Y 5 +X 9", "+Y 5 +X 9", "-Y 5 -X 9", "+Y 5 -X 9"])
+@pytest.mark.parametrize("axes", ["YX", "XY"])
+@pytest.mark.parametrize("coded", ["rows", "pixels", "not"])
+def test_orientations_of_radiance_images(size: str, axes: str, coded: str, tmp_path: Path) -> None:
+    """In all eight the image is upright: the sign of an axis is the direction in which its coordinate changes."""
+    pixels = np.random.default_rng(4).integers(2, 255, (5, 9, 4)).astype(np.uint8)
+    pixels[..., 3] = 129
+    pixels[2, 1:8] = pixels[2, 1]
+    stored_pixels = pixels[:: -1 if "+Y" in size else 1, :: -1 if "-X" in size else 1]
+    if axes == "XY":
+        y, x = size[:4], size[5:]
+        size, stored_pixels = f"{x} {y}", stored_pixels.transpose(1, 0, 2)
+    body = {"rows": by_channel, "pixels": by_pixel, "not": np.ndarray.tobytes}[coded](stored_pixels)
+    head = f"#?RADIANCE\nmade by hand\nFORMAT=32-bit_rle_rgbe\n\n{size}\n"
+    (tmp_path / "a.hdr").write_bytes(head.encode() + body)
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.hdr"), pixels[..., :3] * np.float32(2**-7))
+
+
+def by_channel(pixels: NDArray[np.uint8]) -> bytes:
+    """Rows of runs and literals by channel; those shorter than 8 pixels are not encoded."""
+    width = pixels.shape[1]
+    if width < 8:
+        return pixels.tobytes()
+    rows = b""
+    for row in pixels:
+        rows += bytes((2, 2, 0, width))
+        for plane in row.T.tolist():
+            rows += (
+                bytes((3, *plane[:3], 128 + 2, plane[3], width - 5, *plane[5:]))
+                if plane[3] == plane[4]
+                else bytes((width, *plane))
+            )
+    return rows
+
+
+def by_pixel(pixels: NDArray[np.uint8]) -> bytes:
+    """Runs of equal pixels, as (1, 1, 1, count)."""
+    coded, last, count = b"", b"", 0
+    for pixel in map(bytes, [*pixels.reshape(-1, 4), np.zeros(0, np.uint8)]):
+        if pixel == last:
+            count += 1
+            continue
+        coded += bytes((1, 1, 1, count)) * (count > 0) + pixel
+        last, count = pixel, 0
+    return coded
+
+
+def test_long_runs_of_old_radiance_images(tmp_path: Path) -> None:
+    """Consecutive run counts are the digits of a number to the base 256, the lowest first."""
+    head = b"#?RADIANCE\n\n-Y 2 +X 1000\n"
+    row = bytes((9, 8, 7, 136, 1, 1, 1, 231, 1, 1, 1, 3, 1, 2, 3, 136))  # 1 + 231 + 3·256 = 1000
+    end = bytes((6, 6, 6, 136, 1, 1, 1, 230, 1, 1, 1, 3))
+    (tmp_path / "a.hdr").write_bytes(head + row + end)
+    pixels = read_picture(tmp_path / "a.hdr")
+    assert (pixels[0] == [9, 8, 7]).all() and (pixels[1, 0] == [1, 2, 3]).all() and (pixels[1, 1:] == 6).all()
+
+
+def test_exposures_and_xyz_of_radiance_images(tmp_path: Path) -> None:
+    """Pixels are divided by all exposures and color corrections; XYZ of the white point D65 is white."""
+    pixel = bytes((128, 64, 32, 129))
+    head = (
+        b"#?RADIANCE\r\nEXPOSURE=2\r\nFORMAT=32-bit_rle_rgbe\r\nEXPOSURE= 0.25\r\nCOLORCORR=1 2 4\r\n\r\n-Y 1 +X 1\r\n"
+    )
+    (tmp_path / "a.hdr").write_bytes(head + pixel)
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.hdr"), [[[2, 0.5, 0.125]]])
+    white = bytes((122, 128, 139, 129))  # D65: 0.9505, 1, 1.0891
+    (tmp_path / "b.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n" + white)
+    np.testing.assert_allclose(read_picture(tmp_path / "b.hdr"), [[[1, 1, 1]]], atol=0.02)
 
 
 @pytest.mark.parametrize("mode, dtype", [("L", "u1"), ("LA", "u1"), ("RGB", "u1"), ("RGBA", "u1"), ("RGB", "u2")])

@@ -6,11 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from trimesh.exchange.ply import load_ply
 
 from clrt.errors import SceneError
 from clrt.formats.models import read_mesh
-from clrt.formats.ply import plain_ply
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Mesh
 
@@ -126,57 +124,6 @@ def test_every_format_gives_back_the_ball(name: str, tmp_path: Path) -> None:
     assert np.einsum("ij,ij->i", smooth.normals, smooth.vertices).min() > 0.98
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian", "binary_big_endian"])
-def test_a_ply_file_says_the_same_to_both_readers(encoding: str, tmp_path: Path) -> None:
-    """Both readers agree on files with unused colours, flags and double precision; other files are left to trimesh."""
-    order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[encoding]
-    vertices = np.zeros(
-        3,
-        [
-            ("x", f"{order}f8"),
-            ("y", f"{order}f8"),
-            ("z", f"{order}f8"),
-            ("red", "u1"),
-            *((name, f"{order}f4") for name in ("nx", "ny", "nz")),
-        ],
-    )
-    faces = np.zeros(2, [("flags", "u1"), ("count", "u1"), ("vertex_index", f"{order}u2", 3)])
-    vertices["x"], vertices["y"], vertices["nz"] = [0.1, 1, 0], [0, 0, 1], [1, 2, 3]
-    faces["count"], faces["vertex_index"] = 3, [[0, 1, 2], [2, 1, 0]]
-    header = "\n".join(
-        [
-            f"ply\nformat {encoding} 1.0\ncomment a pair\nelement vertex 3",
-            *(f"property double {name}" for name in "xyz"),
-            "property uchar red",
-            *(f"property float n{name}" for name in "xyz"),
-            "element face 2",
-            "property uchar flags",
-            "property list uchar ushort vertex_index\nend_header\n",
-        ]
-    )
-    rows = [" ".join(str(value) for field in row for value in np.ravel(field)) for row in [*vertices, *faces]]
-    body = ("\n".join(rows) + "\n").encode() if encoding == "ascii" else vertices.tobytes() + faces.tobytes()
-    path = tmp_path / "pair.ply"
-    path.write_bytes(header.encode() + body)
-    ours = plain_ply(path)
-    with path.open("rb") as file:
-        theirs = load_ply(file)
-    assert ours is not None
-    for name in ("vertices", "faces", "vertex_normals"):
-        np.testing.assert_array_equal(ours[name], theirs[name])
-    for old, new in [
-        (b"uchar red", b"uchar u"),
-        (b"list uchar ushort", b"list uchar what"),
-        (b"end_header", b"end"),
-        (b"element face 2", b"element face 0"),
-        (b"element vertex 3", b"element vertex 4"),
-    ]:
-        path.write_bytes((header.encode() + body).replace(old, new))
-        assert plain_ply(path) is None
-    path.write_bytes(header.encode() + body[:-9])
-    assert plain_ply(path) is None
-
-
 def test_polygons_are_cut_into_fans(tmp_path: Path) -> None:
     """A cube of quads and two triangles encloses 8; a hexagon has 4 triangles and its area is 3√3/2."""
     (tmp_path / "quads.off").write_text(
@@ -277,7 +224,6 @@ BROKEN = {
     "empty.obj": ("", "contains no triangles"),
     "above.ply": (TRIANGLE.replace("3 0 1 2", "3 0 1 3"), "faces[0] uses vertex 3, but valid indices are 0 to 2"),
     "below.ply": (TRIANGLE.replace("3 0 1 2", "3 0 1 -1"), "faces[0] uses vertex -1, but valid indices are 0 to 2"),
-    "strips.ply": (STRIPS, "contains no triangles"),
     "header.ply": (STRIPS[:90], "cannot be read as PLY"),
     "empty.ply": ("", "cannot be read as PLY"),
     "empty.stl": ("", "contains no triangles"),
@@ -311,20 +257,3 @@ def test_stl_is_welded_for_smooth_normals(tmp_path: Path) -> None:
     (mesh,) = read_mesh(tmp_path / "cube.stl", "smooth")
     assert mesh.normals is not None
     np.testing.assert_allclose(mesh.normals, mesh.vertices / 3**0.5, atol=1e-6)
-
-
-@pytest.mark.parametrize("face", ["3 0 1 2", "4 0 1 2 2"])
-def test_colours_of_ply_files(face: str, tmp_path: Path) -> None:
-    """Vertex colours are read by both PLY readers."""
-    corners = "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n"
-    properties = "".join(f"property float {axis}\n" for axis in "xyz") + "".join(
-        f"property uchar {color}\n" for color in ("red", "green", "blue")
-    )
-    path = tmp_path / "a.ply"
-    path.write_text(
-        f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face 1\n"
-        f"property list uchar int vertex_indices\nend_header\n{corners}{face}\n"
-    )
-    colors = read_mesh(path)[0].colors
-    assert colors is not None
-    np.testing.assert_allclose(colors, np.eye(3), atol=1e-6)

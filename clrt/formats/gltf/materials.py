@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ...scene.materials.material import BELOW_ONE
 from ...scene.materials.material_types import Diffuse, Material, MetallicRoughness
 from ...scene.materials.textures import Channel, Picture, Texture, Wrap
 from ..images.image_reader import read_texels
@@ -26,8 +27,6 @@ WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 NEAREST = 9728
 #: Upper limit of a material's ior.
 MOST_IOR = 4.0
-#: With an opacity of 1 the alpha of vertex colors would be ignored.
-BELOW_ONE = 1 - 2.0**-24
 #: Value of a base color texture that cannot be read.
 GREY = 0.8
 

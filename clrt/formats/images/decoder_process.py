@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .color_channels import LUMINANCE_CHROMA, NoColorError, color_channels
+
 Found = tuple[dict[str, NDArray[Any]], dict[str, Any]]
 
 #: Memory limit of this process in bytes, and of the largest image: 16384 x 8192 pixels of four floats.
@@ -28,33 +30,88 @@ FREE_BYTES = 2**28
 MOST_RATIO = 2000
 #: Idle seconds after which the process exits.
 IDLE = 2.0
+#: Parts of an image that are looked at.
+MOST_PARTS = 256
+
+
+def fits(decoded: int, stored: int) -> bool:
+    """Return whether an image of so many bytes may come from a file of `stored` bytes."""
+    return decoded <= min(MOST_BYTES, max(FREE_BYTES, MOST_RATIO * stored))
 
 
 def picture(file: str) -> Found:
-    """Return an image's pixels, (h, w, c) uint8, uint16 or float32 as stored, with unassociated alpha.
+    """Return an image's pixels, (h, w, c) uint8, uint16 or float32 as stored, with unassociated alpha: red, green and
+    blue, or grey, then alpha if there is any. They fill the display window, black where there is no data.
 
-    Facts: the channel names, and the size of the full image, of which the pixels may be a crop.
+    Facts: which channels they are, as "RGB", "RGBA", "Y" or "YA"; or what is missing, as `refused`.
     """
     import OpenImageIO as oiio
 
     oiio.attribute("limits:imagesize_MB", MOST_BYTES >> 20)
-    config = oiio.ImageSpec()
-    config.attribute("oiio:UnassociatedAlpha", 1)
-    buffer = oiio.ImageBuf(file, 0, 0, config)
-    kinds = {oiio.UINT8: (oiio.UINT8, 1), oiio.UINT16: (oiio.UINT16, 2)}
-    spec = buffer.nativespec()
-    kind, size = kinds.get(spec.format.basetype, (oiio.FLOAT, 4))
-    count = spec.width * spec.height * spec.nchannels * size
-    if count > max(FREE_BYTES, MOST_RATIO * os.path.getsize(file)):
+    try:
+        parts = _parts(file)
+        chosen = color_channels([(spec.get_string_attribute("name"), spec.channelnames) for spec in parts])
+    except NoColorError as error:
+        return {}, {"refused": str(error)}
+    spec = parts[chosen.part]
+    if spec.deep:
+        return {}, {"refused": "is a deep image; flatten it"}
+    channels = chosen.colors + chosen.alpha
+    dtype = _dtype(spec, channels)
+    area = max(spec.width * spec.height, spec.full_width * spec.full_height)
+    first, last = min(channels), max(channels) + 1
+    if not fits(area * (last - first) * dtype.itemsize, os.path.getsize(file)):
         raise ValueError(f"{os.path.getsize(file)} bytes cannot contain {spec.width}x{spec.height} pixels")
-    pixels = buffer.get_pixels(kind) if buffer.read(0, 0, True, kind) else None
+    kind = getattr(oiio, "FLOAT" if dtype == np.float32 else dtype.name.upper())
+    buffer = _opened(file, chosen.part)
+    pixels = buffer.get_pixels(kind) if buffer.read(chosen.part, 0, first, last, True, kind) else None
     if pixels is None:
         raise ValueError(_complaint(buffer))
-    return {"pixels": pixels}, {
-        "channels": list(spec.channelnames),
-        "whole": [spec.full_width, spec.full_height],
-        "cropped": buffer.roi != buffer.roi_full,
-    }
+    pixels = _displayed(pixels[..., [channel - first for channel in channels]], spec)
+    names = ("RGB" if len(chosen.colors) == 3 else "Y") + "A" * len(chosen.alpha)
+    return {"pixels": pixels.astype(np.float32) if dtype == np.uint32 else pixels}, {"channels": names}
+
+
+def _parts(file: str) -> list[Any]:
+    """Return the specification of each part of an OpenEXR file; of other files, that of the first image."""
+    first = _opened(file, 0)
+    parts = [first.nativespec()]
+    if first.has_error:
+        complaint = _complaint(first)
+        raise NoColorError(LUMINANCE_CHROMA) if "Subsampled" in complaint else ValueError(complaint)
+    count = first.nsubimages if first.file_format_name == "openexr" else 1
+    return parts + [_opened(file, number).nativespec() for number in range(1, min(count, MOST_PARTS))]
+
+
+def _opened(file: str, part: int) -> Any:
+    import OpenImageIO as oiio
+
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    return oiio.ImageBuf(file, part, 0, config)
+
+
+def _dtype(spec: Any, channels: list[int]) -> np.dtype[Any]:
+    """Return the dtype to read channels as: that of the file, or float32 for all others."""
+    import OpenImageIO as oiio
+
+    kinds = {oiio.UINT8: np.uint8, oiio.UINT16: np.uint16, oiio.UINT32: np.uint32}
+    found = {kinds.get(spec.channelformat(channel).basetype, np.float32) for channel in channels}
+    return np.dtype(found.pop() if len(found) == 1 else np.float32)
+
+
+def _displayed(pixels: NDArray[Any], spec: Any) -> NDArray[Any]:
+    """Return the pixels inside the display window, black where the file has none. Raises ValueError if all are."""
+    left, top = spec.x - spec.full_x, spec.y - spec.full_y
+    if (left, top, spec.width, spec.height) == (0, 0, spec.full_width, spec.full_height):
+        return pixels
+    whole = np.zeros((spec.full_height, spec.full_width, pixels.shape[2]), pixels.dtype)
+    shown = pixels[max(-top, 0) : spec.full_height - top, max(-left, 0) : spec.full_width - left]
+    if top >= spec.full_height or left >= spec.full_width or shown.size == 0:
+        raise ValueError("its data window is outside its display window")
+    top, left = max(top, 0), max(left, 0)
+    whole[top : top + shown.shape[0], left : left + shown.shape[1]] = shown
+    return whole
 
 
 def _complaint(buffer: Any) -> str:

@@ -22,15 +22,15 @@ def read_picture(path: StrPath) -> NDArray[np.float32]:
     """Return an image's pixels: (h, w, 3) float32, linear, row 0 on top, NaN and Inf kept.
 
     Float files (.exr, .hdr) are used unchanged; integer ones (.png, .jpg and others) are decoded from sRGB. One channel
-    is grey; alpha is dropped. Raises SceneError naming the file if it is missing, empty, damaged, cropped (a data
-    window that differs from the display window), or has no color channels.
+    is grey; alpha is dropped; of several layers the one that has the image is read (see `color_channels`). Raises
+    SceneError naming the file if it is missing, empty, damaged, or has no color channels.
     """
     path = Path(path)
     _check_stored(path)
     if (radiance := read_radiance(path)) is not None:
         return radiance
     pixels, names = _stored(path, str(path))
-    colours = pixels[..., _colour_channels(str(path), names)]
+    colours = pixels[..., _colour_channels(names)]
     if colours.dtype == np.float32:
         return colours
     return linear_from_srgb(np.asarray(colours / np.float32(np.iinfo(colours.dtype).max), np.float32))
@@ -52,10 +52,9 @@ def read_texels(source: StrPath | bytes, name: str = "") -> NDArray[np.uint8]:
     if pixels.dtype == np.uint16:
         pixels = (pixels.astype(np.uint32) + 128) // 257
     texels = np.full((*pixels.shape[:2], 4), 255, np.uint8)
-    texels[..., :3] = pixels[..., _colour_channels(name, names)]
-    for channel, letter in enumerate(names):
-        if letter.upper() == "A":
-            texels[..., 3] = pixels[..., channel]
+    texels[..., :3] = pixels[..., _colour_channels(names)]
+    if names.endswith("A"):
+        texels[..., 3] = pixels[..., -1]
     return texels
 
 
@@ -65,8 +64,8 @@ def _check_stored(path: Path) -> None:
         raise SceneError(f"{path}: the image file is empty; save it again")
 
 
-def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], list[str]]:
-    """Return the pixels as stored, and the names of the channels."""
+def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], str]:
+    """Return the pixels as stored, and their channels: RGB, RGBA, Y or YA."""
     suffix = ""
     if isinstance(source, bytes):
         suffix = next((ending for start, ending in EMBEDDED.items() if source.startswith(start)), "")
@@ -76,15 +75,9 @@ def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], list[str]]:
         arrays, facts = decode("picture", source, suffix)
     except SceneError as error:
         raise SceneError(f"{name}: cannot be decoded as an image: {error}") from None
-    pixels = arrays["pixels"]
-    if facts["cropped"]:
-        height, width = pixels.shape[:2]
-        full_width, full_height = facts["whole"]
-        raise SceneError(
-            f"{name}: the file contains {width}x{height} pixels of a {full_width}x{full_height} image; "
-            "save it uncropped"
-        )
-    return pixels, facts["channels"]
+    if "refused" in facts:
+        raise SceneError(f"{name}: {facts['refused']}")
+    return arrays["pixels"], facts["channels"]
 
 
 def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -93,11 +86,6 @@ def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(encoded <= 0.04045, encoded / 12.92, power).astype(np.float32)
 
 
-def _colour_channels(file: str, names: list[str]) -> list[int]:
+def _colour_channels(names: str) -> list[int]:
     """Return the indices of red, green and blue among a file's channels."""
-    upper = [name.upper() for name in names]
-    if len(names) <= 2:  # grey, or grey and alpha
-        return [0, 0, 0]
-    if not {"R", "G", "B"} <= set(upper):
-        raise SceneError(f"{file}: has channels {', '.join(names)} instead of R, G, B; save its colour layer alone")
-    return [upper.index(channel) for channel in "RGB"]
+    return [0, 1, 2] if names.startswith("RGB") else [0, 0, 0]

@@ -16,7 +16,9 @@ from ...scene.materials.material_types import Diffuse
 from ...scene.model import FloatArray, Instance, Mesh, Sphere
 from ...scene.validation.validate import index_problems
 from ..models import read_model
-from ..ply import ply_records
+from ..ply.attributes import columns_of, coordinates_of
+from ..ply.elements import Columns, read_elements
+from ..ply.triangles import Fans, faces_of
 from .materials import MaterialReader, ShapeMaterial, absorbing
 from .primitives import cube, cylinder, disk, rectangle, sphere
 from .textures import Attribute, TextureReader
@@ -198,42 +200,36 @@ def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attribute
 
 
 def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
-    """Read a plain PLY file with all its attributes; None for others."""
-    records = ply_records(path)
-    if records is None:
+    """Read a PLY file of faces with all its attributes; None for others."""
+    try:
+        _, elements = read_elements(path.read_bytes(), ("vertex", "face"))
+    except SceneError as error:
+        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+    vertex, found = elements.get("vertex"), faces_of(elements)
+    points = None if vertex is None else columns_of(vertex, ("x", "y", "z"))
+    if vertex is None or found is None or points is None:
         return None
-    vertex, face = records
-
-    def columns(*names: str) -> FloatArray | None:
-        names_there = vertex.dtype.names or ()
-        if not set(names) <= {*names_there}:
-            return None
-        return np.column_stack([vertex[name] for name in names]).astype(np.float32)
-
-    vertices = columns("x", "y", "z")
-    assert vertices is not None  # guaranteed by ply_records
-    faces = face["corners list"]["indices"]
-    if problems := index_problems(faces, len(vertices), f'mesh "{path.stem}"'):
+    face, fans = found[0], Fans(found[1])
+    if problems := index_problems(fans.vertices, vertex.count, f'mesh "{path.stem}"'):
         raise SceneError([f"{path}: {problem}" for problem in problems])
-    uv = next((found for pair in ("uv", "st") if (found := columns(*pair)) is not None), None)
-    mesh = Mesh(vertices, faces.astype(np.int32), name=path.stem, normals=columns("nx", "ny", "nz"), uv=uv)
-    attributes = {
-        f"{prefix}_{name}": values
-        for prefix, table in (("vertex", vertex), ("face", face))
-        for name, values in _attributes(table).items()
-    }
-    return mesh, attributes
+    mesh = Mesh(points, fans.vertices, name=path.stem)
+    normals, uv = columns_of(vertex, ("nx", "ny", "nz")), coordinates_of(vertex)
+    mesh.normals = None if normals is None else normals.astype(np.float32)
+    mesh.uv = None if uv is None else uv.astype(np.float32)
+    of_faces = {name: values[fans.polygons] for name, values in _attributes(face).items()}
+    attributes = {f"vertex_{name}": values for name, values in _attributes(vertex).items()}
+    return mesh, attributes | {f"face_{name}": values for name, values in of_faces.items()}
 
 
-def _attributes(table: np.ndarray[tuple[int], np.dtype[np.void]]) -> dict[str, FloatArray]:
+def _attributes(table: Columns) -> dict[str, FloatArray]:
     """Collect columns color_0, color_1 … into arrays (n, k), by name."""
     groups: dict[str, list[str]] = {}
-    for column in table.dtype.names or ():
+    for column in table.scalars:
         name, _, place = column.rpartition("_")
         if name and place.isdigit() or name and place in "rgb":
             groups.setdefault(name, []).append(column)
     return {
-        name: np.column_stack([table[column] for column in columns]).astype(np.float32)
+        name: np.column_stack([table.scalars[column] for column in columns]).astype(np.float32)
         for name, columns in groups.items()
     }
 

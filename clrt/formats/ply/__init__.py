@@ -1,0 +1,1 @@
+"""PLY model files (G. Turk, "The PLY Polygon File Format", 1994)."""
