@@ -1,0 +1,61 @@
+"""Units of the lights of a glTF file.
+
+The specification (KHR_lights_punctual) says candela and lux. Many programs write W/sr and W/m², or numbers without a
+unit, that are right if a renderer takes them so. Blender writes, by a choice of its exporter that the file does not
+mention, either photometric units (its default since version 3.6), or radiometric ones, or its own: W/m² of a sun, and
+the W that a point or spot light emits in all directions. Materials' emission is radiometric in all of them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from math import pi
+from typing import Literal, get_args
+
+import numpy as np
+
+from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
+
+LightUnit = Literal["photometric", "radiometric", "blender"]
+UNITS: tuple[LightUnit, ...] = get_args(LightUnit)
+#: Luminous efficacy in lm/W of light of 555 nm, which defines the candela. Blender converts white light by it, too.
+EFFICACY = 683.0
+#: Irradiance of the brightest light above which it is taken as lux: it is near the geometric mean of what lights a
+#: scene well, 1 to 10 W/m², and of the same in lux.
+BRIGHTEST = 50.0
+#: Blender's exporter before version 3.6 wrote the numbers that Blender shows.
+OLD_BLENDER = re.compile(r"Khronos Blender glTF 2\.0|Khronos glTF Blender I/O v([0-2]\.|3\.[0-5]\.)")
+
+
+def guess_unit(
+    lights: Sequence[Light], generator: str | None, middle: np.typing.ArrayLike, radius: float
+) -> LightUnit:
+    """Return the unit of a file's lights, by the program that wrote it and by how brightly they light the scene.
+
+    middle, radius: of the scene's bounding sphere.
+    """
+    if OLD_BLENDER.match(generator or ""):
+        return "blender"
+    irradiances = [_irradiance(light, np.asarray(middle), radius) for light in lights]
+    return "photometric" if max(irradiances, default=0.0) > BRIGHTEST else "radiometric"
+
+
+def _irradiance(light: Light, middle: np.typing.NDArray[np.float64], radius: float) -> float:
+    """Return the irradiance in the middle of the scene, or of a light in the scene, at the scene's radius."""
+    if isinstance(light, PointLight | SpotLight):
+        distance = max(float(np.linalg.norm(np.subtract(light.position, middle))), radius)
+        return max(light.intensity) / distance**2 if distance else 0.0
+    assert isinstance(light, DirectionalLight)
+    return max(light.irradiance)
+
+
+def to_radiometric(light: Light, unit: LightUnit) -> Light:
+    """Return the light with its number in W/sr, or in W/m² if it is directional."""
+    if isinstance(light, DirectionalLight):
+        factor = {"photometric": 1 / EFFICACY, "radiometric": 1.0, "blender": 1.0}[unit]
+        return replace(light, irradiance=tuple(factor * x for x in light.irradiance))
+    assert isinstance(light, PointLight | SpotLight)
+    factor = {"photometric": 1 / EFFICACY, "radiometric": 1.0, "blender": 1 / (4 * pi)}[unit]
+    return replace(light, intensity=tuple(factor * x for x in light.intensity))
