@@ -91,7 +91,10 @@ def test_frames_of_an_animated_model(tmp_path: Path, monkeypatch: pytest.MonkeyP
         render(*small, "--animation", "walk", "--animation-time", str(number / 2), "-o", "still.exr")
         np.testing.assert_array_equal(read_image(Path(f"f_{number}.exr")), read_image(Path("still.exr")))
     assert len({Path(name).read_bytes() for name in written}) == 3
-    assert len({metadata_of(Path(name), "clrt:frame_hash") for name in written}) == 3
+    del gltf.document["nodes"][1]["camera"]
+    gltf.write(Path("framed.glb"))
+    framed = render("framed.glb", *asked[1:], "-o", "framed_#.png")
+    assert len({metadata_of(Path(name), "clrt:frame_hash") for name in framed}) == 3, "one camera, three poses"
     Path(written[1]).unlink()
     assert render(*asked, "-o", "f_#.exr", "--resume") == [written[1]]
     assert len(render(*small, "--frames", "all", "--fps", "2", "-o", "g_#.png")) == 5
