@@ -182,6 +182,28 @@ def test_scenes_by_name(tmp_path: Path) -> None:
         clrt.load(path, scene="fr")
 
 
+def test_poses_in_scene_files(path: Path) -> None:
+    """[[mesh]] has the same keys; without a time the animation is at its start."""
+    toml = path.with_suffix(".toml")
+    for keys, expected in [
+        ('animation = "walk"\ntime = 0.5', TRIANGLE + [1.5, 0, 0]),
+        ('animation = "walk"', TRIANGLE + [1, 0, 0]),
+        ("time = 0.5", TRIANGLE + [1.5, 0, 0]),
+        ('scene = "0"', TRIANGLE + [0, 7, 0]),
+    ]:
+        toml.write_text(f'[[mesh]]\nfile = "a.glb"\n{keys}\n')
+        assert load(toml).meshes[0].vertices == pytest.approx(expected)
+    for keys, words in [
+        ('file = "a.glb"\nvariant = "x"', 'variant: "x" is unknown; the file has none; leave variant out'),
+        ("time = 1\nvertices = []\nfaces = []", "mesh[0]: has time, but no file; leave it out, or write a file"),
+        ('file = "a.glb"\ntime = inf', "time"),
+    ]:
+        toml.write_text(f"[[mesh]]\n{keys}\n")
+        with pytest.raises(SceneError) as caught:
+            load(toml)
+        assert words in str(caught.value)
+
+
 def test_choices_that_a_file_does_not_have(path: Path, folder: Path) -> None:
     with pytest.raises(SceneError, match='a.glb: animation: "run" is unknown; use one of "walk", "animation 1"'):
         clrt.load(path, animation="run")
