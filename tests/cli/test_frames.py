@@ -17,7 +17,7 @@ from PIL import Image
 import clrt
 from clrt.cli.frames import numbered
 from clrt.cli.render import command
-from clrt.output.images import read_image
+from clrt.output.images import metadata_of, read_image
 from clrt.output.video import write_video
 from clrt.scene.camera_path import frames
 
@@ -78,9 +78,11 @@ def test_each_frame_is_what_a_render_of_its_own_gives(flight: Path) -> None:
 
 
 def test_frames_of_an_animated_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each is the still of --animation-time, at 24 frames per second unless --fps is given; --resume skips them."""
+    """Each is the image of that time, at 24 frames per second unless --fps is given; --resume skips them."""
     monkeypatch.chdir(tmp_path)
-    animated().write(Path("a.glb"))
+    gltf = animated()
+    gltf.document["scenes"][0]["nodes"] += gltf.document["nodes"][0].pop("children")  # a camera that stands still
+    gltf.write(Path("a.glb"))
     small = "a.glb", "--size", "16x16", "--spp", "2", "--depth", "2"
     asked = *small, "--animation", "walk", "--frames", "0,2,4", "--fps", "2"
     written = [f"f_{number}.exr" for number in (0, 2, 4)]
@@ -89,6 +91,10 @@ def test_frames_of_an_animated_model(tmp_path: Path, monkeypatch: pytest.MonkeyP
         render(*small, "--animation", "walk", "--animation-time", str(number / 2), "-o", "still.exr")
         np.testing.assert_array_equal(read_image(Path(f"f_{number}.exr")), read_image(Path("still.exr")))
     assert len({Path(name).read_bytes() for name in written}) == 3
+    del gltf.document["nodes"][1]["camera"]
+    gltf.write(Path("framed.glb"))
+    framed = render("framed.glb", *asked[1:], "-o", "framed_#.png")
+    assert len({metadata_of(Path(name), "clrt:frame_hash") for name in framed}) == 3, "one camera, three poses"
     Path(written[1]).unlink()
     assert render(*asked, "-o", "f_#.exr", "--resume") == [written[1]]
     assert len(render(*small, "--frames", "all", "--fps", "2", "-o", "g_#.png")) == 5

@@ -307,6 +307,17 @@ def test_extensions(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
         read(gltf, tmp_path)
 
 
+def test_invisible_nodes(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """They are left out, and so is what is below them."""
+    gltf = ball()
+    below = gltf.node(False, mesh=0, translation=[0, 0, 9])
+    gltf.node(children=[below], extensions={"KHR_node_visibility": {"visible": False}})
+    gltf.node(mesh=0, translation=[0, 0, -9], extensions={"KHR_node_visibility": {"visible": True}})
+    gltf.document["extensionsUsed"] = ["KHR_node_visibility"]
+    heights = [round(float(mesh.vertices[:, 2].mean())) for mesh in read(gltf, tmp_path).meshes]
+    assert heights == [0, -9] and not caplog.text
+
+
 def test_files_without_nodes_or_scenes(tmp_path: Path) -> None:
     gltf = ball()
     gltf.document["nodes"][0]["translation"] = [0, 0, 9]

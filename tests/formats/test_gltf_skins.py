@@ -104,6 +104,8 @@ def test_weights_are_divided_by_their_sum(tmp_path: Path) -> None:
     stored[0], stored[1], stored[2] = 0, (np.nan, 0.5, 0, 0), (-1, 0.25, 0.25, np.inf)
     skinned.primitive["attributes"]["WEIGHTS_0"] = skinned.gltf.accessor(stored)
     skinned.weights[:3] = (1, 0, 0, 0), (0, 1, 0, 0), (0, 0.5, 0.5, 0)
+    skinned.joints[0] = 2, 0, 1, 0
+    skinned.primitive["attributes"]["JOINTS_0"] = skinned.gltf.accessor(skinned.joints, "<u1")
     check(skinned, tmp_path)
 
 

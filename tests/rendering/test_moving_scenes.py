@@ -44,13 +44,14 @@ def test_moved_scenes_give_the_images_of_new_renderers(device: Device) -> None:
     first = image(renderer)
     assert can_refit(renderer.compiled.tree)
     trees = []
-    fewer = scene(2.0)
-    fewer.meshes[1].faces = FACES[:100]
-    for each in (scene(1.0), scene(2.5, 0.4), replace(scene(2.5, 0.4), camera=clrt.Camera(position=(3, 0, 4))), fewer):
+    fewer, later = scene(2.0), scene(3.0)
+    fewer.meshes[1].faces = later.meshes[1].faces = FACES[:100]
+    turned = replace(scene(2.5, 0.4), camera=clrt.Camera(position=(3, 0, 4)))
+    for each in (scene(1.0), scene(2.5, 0.4), turned, fewer, later):
         renderer.show(each)
         trees.append(renderer.compiled.tree.buffers["nodes"])
         np.testing.assert_array_equal(image(renderer), image(begun(device, each)))
-    assert trees[0] is trees[1] is trees[2] and trees[3] is not trees[0]
+    assert trees[0] is trees[1] is trees[2] and trees[3] is not trees[0] and trees[4] is not trees[0]
     renderer.show(scene(0))
     np.testing.assert_array_equal(image(renderer), first)
 

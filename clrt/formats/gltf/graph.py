@@ -15,7 +15,7 @@ Placed = tuple[gltf.Node, Matrix]
 
 
 class NodeGraph:
-    """Nodes of one of the document's scenes: `placed`, in depth-first order, each with its matrix to the world.
+    """Visible nodes of one of the document's scenes: `placed`, depth first, each with its matrix to the world.
 
     Without nodes each mesh gets the identity. nodes: the document's, as posed; scene: its index; None for the default.
     """
@@ -42,6 +42,8 @@ class NodeGraph:
                 raise SceneError(f"node {index}: has two parents or is its own ancestor; export the file again")
             node = gltf.entry(self._nodes, index, "node", "the scene")
             matrix = self._worlds[index] = parent @ _local(node, index)
+            if not node.extensions.KHR_node_visibility.visible:
+                continue
             yield node, matrix
             waiting += [(child, matrix) for child in reversed(node.children)]
 

@@ -44,6 +44,7 @@ EXTENSIONS = frozenset(
         "KHR_draco_mesh_compression",
         "KHR_lights_punctual",
         "KHR_mesh_quantization",
+        "KHR_node_visibility",
         "KHR_texture_transform",
     }
 )
@@ -171,9 +172,14 @@ class Instancing(Part):
     attributes: dict[str, Index]
 
 
+class Visibility(Part):
+    visible: bool = True
+
+
 class NodeExtensions(Part):
     EXT_mesh_gpu_instancing: Instancing | None = None
     KHR_lights_punctual: UsedLight | None = None
+    KHR_node_visibility: Visibility = Visibility()
 
 
 class Variant(Part):

@@ -17,6 +17,7 @@ from ...scene.geometry.normals import Normals, choose_normals
 from ...scene.materials.material_types import Diffuse
 from ...scene.model import Instance, Mesh, Model, Vector
 from ...scene.validation.validate import mesh_problems
+from ..model_choice import DEFAULT, ModelChoice
 from ..models import read_model
 from .placement import Transform
 
@@ -29,6 +30,10 @@ class MeshTable(Transform):
 
     name: str | None = None
     file: str | None = None
+    scene: str | None = None
+    variant: str | None = None
+    animation: str | None = None
+    time: float | None = None
     vertices: tuple[Vector, ...] | None = None
     faces: tuple[tuple[Vertex, Vertex, Vertex], ...] | None = None
     uv: tuple[tuple[float, float], ...] | None = None
@@ -64,8 +69,13 @@ class MeshTable(Transform):
         inline = self.vertices is not None or self.faces is not None or self.uv is not None
         if self.file is not None and inline:
             raise SceneError(f"{where}: has both a file and vertices, faces or uv; keep one of them")
+        # In a scene file the model is a still.
+        time = 0.0 if self.animation is not None and self.time is None else self.time
+        choice = ModelChoice(scene=self.scene, variant=self.variant, animation=self.animation, time=time)
         if self.file is not None:
-            return self._from_file(self.file, folder, where)
+            return self._from_file(self.file, choice, folder, where)
+        if choice != DEFAULT:
+            raise SceneError(f"{where}: has {choice.given()[0]}, but no file; leave it out, or write a file")
         if self.vertices is None or self.faces is None:
             missing = "faces" if self.vertices else "vertices" if self.faces else "file"
             raise SceneError(f"{where}: {missing} is missing; write a file, or vertices and faces")
@@ -80,9 +90,9 @@ class MeshTable(Transform):
         mesh.normals = choose_normals(self.normals, vertices, faces, None)
         return Model(meshes=[mesh])
 
-    def _from_file(self, file: str, folder: Path, where: str) -> Model:
+    def _from_file(self, file: str, choice: ModelChoice, folder: Path, where: str) -> Model:
         try:
-            model = read_model(folder / file, self.normals)
+            model = read_model(folder / file, self.normals, choice)
         except SceneError as error:
             raise SceneError([f"{where}.file: {problem}" for problem in error.problems]) from None
         if self.name is not None:
