@@ -1,4 +1,4 @@
-"""Model file reading. STL, OFF and uncommon PLY files use trimesh's parsers; other readers are our own.
+"""Model file reading. STL and uncommon PLY files use trimesh's parsers; other readers are our own.
 
 To add a format: write its reader, and its entry in FORMATS, where the scene file, `load` and the command line find it.
 
@@ -25,6 +25,7 @@ from ..scene.model import Mesh, Model
 from ..scene.validation.validate import index_problems, mesh_problems
 from .images.image_reader import linear_from_srgb
 from .ply import plain_ply
+from .polygons import triangulate
 from .referenced_files import check_file, name_of
 
 log = logging.getLogger(__name__)
@@ -39,7 +40,7 @@ def read_mesh(path: StrPath, normals: Normals = "file") -> list[Mesh]:
 def read_model(path: StrPath, normals: Normals = "file") -> Model:
     """Read a model file: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
 
-    Polygons become triangle fans. `normals`: see `choose_normals`. Raises SceneError naming the file, the mesh, and the
+    Polygons are triangulated. `normals`: see `choose_normals`. Raises SceneError naming the file, the mesh, and the
     index or vertex that is wrong.
     """
     path = Path(path)
@@ -81,11 +82,9 @@ def _stl(path: Path) -> dict[str, Any]:
 
 
 def _off(path: Path) -> dict[str, Any]:
-    from trimesh.exchange.off import load_off
+    from .off import parse_off
 
-    with path.open("rb") as file:
-        parts: dict[str, Any] = load_off(file)
-    return parts
+    return parse_off(path)
 
 
 def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals], Model]:
@@ -161,7 +160,7 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
             stored = piece.get("vertex_normals")
             stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
             uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
-        faces = _triangles(np.asarray(piece["faces"], np.int64), name)
+        faces = _triangles(vertices, np.asarray(piece["faces"], np.int64), name)
     except (TypeError, ValueError):
         raise SceneError(f'mesh "{name}": its lines have different numbers of values; export it again') from None
     colors = _linear_colors(piece.get("vertex_colors"))
@@ -201,14 +200,16 @@ def _linear_colors(colors: Any) -> NDArray[np.float32] | None:
     return linear_from_srgb(np.nan_to_num(encoded).clip(0, 1))
 
 
-def _triangles(polygons: NDArray[np.int64], name: str) -> NDArray[np.int64]:
-    """Split polygons of k corners, (m, k), into fans of k − 2 triangles."""
+def _triangles(vertices: NDArray[np.float32], polygons: NDArray[np.int64], name: str) -> NDArray[np.int64]:
+    """Split polygons of k corners, (m, k), into k − 2 triangles each."""
     if polygons.ndim != 2 or polygons.shape[1] < 3:
         raise SceneError(f'mesh "{name}": its faces have fewer than 3 corners; export triangles')
     if polygons.shape[1] == 3:
         return polygons
-    fans = [polygons[:, [0, corner, corner + 1]] for corner in range(1, polygons.shape[1] - 1)]
-    return np.stack(fans, axis=1).reshape(-1, 3)
+    if problems := index_problems(polygons, len(vertices), f'mesh "{name}"'):
+        raise SceneError(problems)
+    corners = polygons.ravel()
+    return corners[triangulate(vertices.astype(np.float64), corners, np.full(len(polygons), polygons.shape[1]))]
 
 
 def _size(array: Any) -> int:
