@@ -21,6 +21,8 @@ DIGITS, MARGIN = 19, 24
 #: Integers below this, and powers of ten up to this one, are float64 values, so that one division rounds correctly.
 EXACT_INTEGER, EXACT_POWER = 1 << 53, 22
 POWERS = np.array([10**power for power in range(DIGITS + 1)], np.uint64)
+#: Steps that join neighboring digits, then pairs and groups of four: the distance in bits, and the bits of the results.
+PAIRS = ((8, 0x00FF00FF00FF00FF), (16, 0x0000FFFF0000FFFF), (32, 0x00000000FFFFFFFF))
 FLOAT_POWERS = 10.0 ** np.arange(EXACT_POWER + 1)
 #: What C libraries print for undefined and infinite values, beyond what `float` accepts.
 NAN, INFINITE = re.compile(rb"[-+]?(nan|1\.#(ind|qnan|snan))"), re.compile(rb"[-+]?1\.#inf")
@@ -81,9 +83,8 @@ def digits(text: Bytes, ends: Ints, lengths: Ints) -> tuple[NDArray[np.uint64], 
         word >>= unwanted
         word <<= unwanted
         strange |= (word + 0x7676767676767676) | word
-        word = (word * 10 + (word >> 8)) & 0x00FF00FF00FF00FF
-        word = (word * 100 + (word >> 16)) & 0x0000FFFF0000FFFF
-        word = (word * 10000 + (word >> 32)) & 0x00000000FFFFFFFF
+        for shift, mask in PAIRS:
+            word = word * np.uint64(10 ** (shift >> 3)) + (word >> np.uint64(shift)) & np.uint64(mask)
         values += word * POWERS[done] if done else word
     return values, strange & 0x8080808080808080 != 0
 

@@ -109,7 +109,7 @@ def _valid_faces(path: Path, blocks: list[Block], tables: Tables) -> tuple[Corne
         count = sum(block.bad_faces for block in blocks) + int(bad.sum())
         if bad.all():
             raise SceneError(f"{faults[0]}; repair the file")
-        log.warning("%s: %d of its faces are invalid and ignored; the first: %s", path, count, faults[0])
+        log.warning("%s: ignored: %d invalid faces; the first: %s", path, count, faults[0])
     return without(bad, corners), owners[~bad]
 
 

@@ -105,7 +105,8 @@ class _Lines:
     def starting_with(self, key: str) -> Flags:
         """Return which lines start with this word, of at most 7 characters, and a space."""
         start = f"{key} ".encode()
-        return self._words & ((1 << 8 * len(start)) - 1) == int.from_bytes(start, "little")
+        mask, wanted = (1 << 8 * len(start)) - 1, int.from_bytes(start, "little")
+        return np.asarray(self._words & mask == wanted)
 
     def numbers(self, key: str) -> Bytes:
         """Return the lines that start with this word, with spaces in place of the word and of comments."""
