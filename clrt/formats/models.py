@@ -1,4 +1,4 @@
-"""Model file reading. STL, OFF and uncommon PLY files use trimesh's parsers; other readers are our own.
+"""Model file reading. STL and uncommon PLY files use trimesh's parsers; other readers are our own.
 
 To add a format: write its reader, and its entry in FORMATS, where the scene file, `load` and the command line find it.
 
@@ -27,6 +27,7 @@ from ..scene.model import Mesh, Model
 from ..scene.validation.validate import mesh_problems
 from .images.image_reader import linear_from_srgb
 from .model_choice import DEFAULT, ModelChoice
+from .polygons import triangulate
 from .referenced_files import check_file, name_of
 
 log = logging.getLogger(__name__)
@@ -41,8 +42,8 @@ def read_mesh(path: StrPath, normals: Normals = "file") -> list[Mesh]:
 def read_model(path: StrPath, normals: Normals = "file", choice: ModelChoice = DEFAULT) -> Model:
     """Read a model file: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
 
-    Polygons become triangle fans. `normals`: see `choose_normals`; choice: for glTF files. Raises SceneError naming the
-    file, the mesh, and the index or vertex that is wrong.
+    Polygons are triangulated. `normals`: see `choose_normals`; choice: for glTF files. Raises SceneError naming the file,
+    the mesh, and the index or vertex that is wrong.
     """
     path = Path(path)
     format = FORMATS.get(path.suffix.lower())
@@ -161,7 +162,8 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
             stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
             uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
         faces = np.asarray(piece["faces"])
-        faces = _triangles(faces if np.issubdtype(faces.dtype, np.integer) else faces.astype(np.int64), name)
+        faces = faces if np.issubdtype(faces.dtype, np.integer) else faces.astype(np.int64)
+        faces = _triangles(vertices, faces, name)
     except (TypeError, ValueError):
         raise SceneError(f'mesh "{name}": its lines have different numbers of values; export it again') from None
     colors = _linear_colors(piece.get("vertex_colors"))
@@ -206,14 +208,16 @@ def _linear_colors(colors: Any) -> NDArray[np.float32] | None:
     return np.concatenate([linear, alpha], axis=1) if alpha.any() and (alpha < 1).any() else linear
 
 
-def _triangles(polygons: NDArray[np.integer], name: str) -> NDArray[np.integer]:
-    """Split polygons of k corners, (m, k), into fans of k − 2 triangles."""
+def _triangles(vertices: NDArray[np.float32], polygons: NDArray[np.integer], name: str) -> NDArray[np.integer]:
+    """Split polygons of k corners, (m, k), into k − 2 triangles each."""
     if polygons.ndim != 2 or polygons.shape[1] < 3:
         raise SceneError(f'mesh "{name}": its faces have fewer than 3 corners; export triangles')
     if polygons.shape[1] == 3:
         return polygons
-    fans = [polygons[:, [0, corner, corner + 1]] for corner in range(1, polygons.shape[1] - 1)]
-    return np.stack(fans, axis=1).reshape(-1, 3)
+    if problems := index_problems(polygons, len(vertices), f'mesh "{name}"'):
+        raise SceneError(problems)
+    corners = polygons.ravel()
+    return corners[triangulate(vertices.astype(np.float64), corners, np.full(len(polygons), polygons.shape[1]))]
 
 
 def _size(array: Any) -> int:

@@ -33,13 +33,13 @@ def triangulate(points: Floats, corners: NDArray[np.integer[Any]], sizes: Ints) 
     if (sizes == 3).all():
         return triangles
     ends = np.cumsum(sizes - 2)
-    turned, normals = _turned_over(points, corners, triangles, ends)
-    if len(turned):
-        places = ranges((np.cumsum(sizes) - sizes)[turned], sizes[turned])
-        flat = _projected(points[corners[places]], np.repeat(normals, sizes[turned], axis=0))
-        triangles[ranges(ends[turned] - (sizes[turned] - 2), sizes[turned] - 2)] = places[
-            _clip_ears(flat, sizes[turned])
-        ]
+    with np.errstate(all="ignore"):  # coordinates may be huge or not finite
+        turned, normals = _turned_over(points, corners, triangles, ends)
+        if len(turned):
+            places = ranges((np.cumsum(sizes) - sizes)[turned], sizes[turned])
+            flat = _projected(points[corners[places]], np.repeat(normals, sizes[turned], axis=0))
+            clipped = ranges(ends[turned] - (sizes[turned] - 2), sizes[turned] - 2)
+            triangles[clipped] = places[_clip_ears(flat, sizes[turned])]
     return triangles
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from ...errors import SceneError
 from ...file_names import printable
 from ...scene.materials.material_types import Material
+from ..plain_text import plain_text
 from ..referenced_files import find_file, note_read
 from .mtl import MtlMaterial, left_out, material, read_library
 from .mtl_maps import Maps
-from .plain_text import plain_text
 
 log = logging.getLogger(__name__)
 

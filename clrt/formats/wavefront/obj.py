@@ -21,6 +21,7 @@ from ...scene.materials.material_types import Material
 from ...threads import in_parallel
 from ..polygons import ranges, triangulate
 from ..referenced_files import name_of, note_read
+from ..text_numbers import reuse_memory
 from .distinct import distinct
 from .libraries import read_libraries
 from .obj_lines import TABLES, Block, Corners, block_ranges, read_block, without
@@ -49,6 +50,7 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
     Invalid faces are ignored with a warning. Raises SceneError for other malformed lines, and if all faces are invalid.
     """
     note_read(path)
+    reuse_memory()
     blocks = in_parallel(lambda limits: read_block(path, *limits), block_ranges(path))
     points, uv, normals = (_joined([block.tables[key] for block in blocks]) for key in TABLES)
     tables = Tables(points[:, :3], uv, normals, _colors(points[:, 3:]))
@@ -56,6 +58,7 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
     libraries = [name for block in blocks for name in block.libraries]
     materials = read_libraries(path, libraries, used)
     corners, owners = _valid_faces(path, blocks, tables)
+    del blocks
     names, owners = _material_names(["", *used], owners, materials)
     if materials or not libraries:
         _warn_of_undefined(path, names, materials)
@@ -106,7 +109,7 @@ def _valid_faces(path: Path, blocks: list[Block], tables: Tables) -> tuple[Corne
         count = sum(block.bad_faces for block in blocks) + int(bad.sum())
         if bad.all():
             raise SceneError(f"{faults[0]}; repair the file")
-        log.warning("%s: %d of its faces are invalid and ignored; the first: %s", path, count, faults[0])
+        log.warning("%s: ignored: %d invalid faces; the first: %s", path, count, faults[0])
     return without(bad, corners), owners[~bad]
 
 
@@ -166,15 +169,18 @@ def _split(corners: Corners, owners: Ints, count: int) -> list[Corners]:
 
 def _mesh(tables: Tables, corners: Corners) -> dict[str, Any]:
     """Return the arrays of a mesh with one vertex per combination of indices."""
-    triangles = triangulate(tables.points, corners.indices[:, 0] - 1, corners.sizes)
     numbers, rows = distinct(corners.indices)
+    if (corners.sizes == 3).all():
+        faces = numbers.reshape(-1, 3)
+    else:
+        faces = numbers[triangulate(tables.points, corners.indices[:, 0] - 1, corners.sizes)]
     vertex, uv, normal = rows.T - 1
     colors = None if tables.colors is None else tables.colors[vertex]
     if colors is not None and (without_color := np.isnan(colors).any(axis=1)).any():
         colors = None if without_color.all() else np.where(without_color[:, None], 1.0, colors)
     return {
         "vertices": tables.points[vertex],
-        "faces": numbers[triangles],
+        "faces": faces,
         "vertex_normals": _taken(tables.normals, normal),
         "uv": _taken(tables.uv, uv),
         "vertex_colors": colors,

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...file_names import printable
+from ..plain_text import plain_text
 from ..text_numbers import (
     DIGITS,
     MARGIN,
@@ -25,15 +27,16 @@ from ..text_numbers import (
     padded,
     per_line,
     runs,
+    table,
     words_at,
 )
-from .plain_text import plain_text
 
-#: Bytes that are parsed at a time; the arrays are small enough to stay in a core's cache.
-BLOCK = 1 << 18
+#: Bytes that are parsed at a time.
+BLOCK = 1 << 20
 #: Lines of numbers: how many they must have, and how many are used; those of a vertex may include a color.
 TABLES = {"v": (3, 6), "vt": (1, 2), "vn": (3, 3)}
 NEWLINE, SPACE, HASH, PLUS, MINUS, SLASH, ZERO = b"\n #+-/0"
+INDENT = re.compile(rb"^ +", re.MULTILINE)
 LARGEST_INDEX = np.iinfo(np.int32).max
 
 
@@ -76,7 +79,10 @@ def read_block(path: Path, start: int, end: int) -> Block:
     """Read and parse a block. Raises SceneError for malformed lines of numbers."""
     with path.open("rb") as file:
         file.seek(start)
-        lines = _Lines(plain_text(file.read(end - start), first=start == 0))
+        text = plain_text(file.read(end - start), first=start == 0)
+    lines = _Lines(text)
+    if lines.starting_with("").any():
+        lines = _Lines(INDENT.sub(b"", text))
     tables = {key: _parse_table(lines.numbers(key), key) for key in TABLES}
     faces = lines.starting_with("f")
     corners, bad, fault = _parse_faces(lines.numbers("f"), lambda: lines.counts_before(faces))
@@ -99,7 +105,8 @@ class _Lines:
     def starting_with(self, key: str) -> Flags:
         """Return which lines start with this word, of at most 7 characters, and a space."""
         start = f"{key} ".encode()
-        return self._words & ((1 << 8 * len(start)) - 1) == int.from_bytes(start, "little")
+        mask, wanted = (1 << 8 * len(start)) - 1, int.from_bytes(start, "little")
+        return np.asarray(self._words & mask == wanted)
 
     def numbers(self, key: str) -> Bytes:
         """Return the lines that start with this word, with spaces in place of the word and of comments."""
@@ -148,12 +155,7 @@ def _parse_table(text: Bytes, key: str) -> Floats:
         line = _line(text, int(odd[0]))
         hint = "write points in decimals" if "," in line else "repair the file"
         raise SceneError(f'a line "{key} {line}" needs {least} numbers; {hint}')
-    width = int(min(counts.max(initial=least), most))
-    if len(counts) and (counts == counts[0]).all():
-        return values.reshape(len(counts), -1)[:, :width]
-    columns = np.arange(width)
-    places = np.minimum((np.cumsum(counts) - counts)[:, None] + columns, len(values) - 1)
-    return np.where(columns < counts[:, None], values[places], np.nan)
+    return table(values, counts, int(min(counts.max(initial=least), most)))
 
 
 def _parse_faces(text: Bytes, counts_before: Callable[[], Ints]) -> tuple[Corners, Flags, str]:
@@ -162,34 +164,30 @@ def _parse_faces(text: Bytes, counts_before: Callable[[], Ints]) -> tuple[Corner
     counts_before: returns the numbers of vertices, texture coordinates and normals before each line.
     """
     starts, ends = runs(text - ZERO < 10)
-    lengths = ends - starts
+    lengths, heads = ends - starts, starts
     values, _ = digits(text, ends, np.minimum(lengths, DIGITS))
-    before = text[starts - 1]
-    signed = (before == MINUS) | (before == PLUS)
-    heads = starts - signed
-    slash = text[heads - 1] == SLASH
-    columns, odd = _columns(text, heads, ends, slash)
-    odd |= (lengths > DIGITS) | (values > LARGEST_INDEX)
     strange = np.flatnonzero((text - SLASH > 10) & (text > SPACE))
     if len(strange):
-        strange = np.setdiff1d(strange, heads[signed])
+        heads = starts - np.isin(text[starts - 1], (PLUS, MINUS))
+        strange = np.setdiff1d(strange, heads[heads < starts])
+    slash = text[heads - 1] == SLASH
+    columns, odd = _columns(text, heads, ends, slash)
+    if lengths.max(initial=0) > DIGITS or values.max(initial=0) > LARGEST_INDEX:
+        odd |= (lengths > DIGITS) | (values > LARGEST_INDEX)
     no_index = np.searchsorted(np.flatnonzero(text == NEWLINE), np.concatenate([starts[odd], strange]))
     sizes = per_line(text, starts[~slash])
     bad = sizes < 3
     bad[no_index] = True
-    targets, usable = 3 * (np.cumsum(~slash) - 1) + columns, ~odd
-    indices = np.zeros((sizes.sum(), 3), np.int32)
-    indices.reshape(-1)[targets[usable]] = values[usable]
+    indices = _by_corner(values, slash, columns, odd)
     relative = None
-    if (negative := usable & (before == MINUS) & (values > 0)).any():
-        relative = np.zeros(indices.shape, np.bool_)
-        relative.reshape(-1)[targets[negative]] = True
+    if (negative := (heads < starts) & (text[starts - 1] == MINUS) & (values > 0)).any():
+        relative = _by_corner(negative, slash, columns, odd) > 0
         indices = np.where(relative, np.repeat(counts_before(), sizes, axis=0) + 1 - indices, indices).astype(np.int32)
     fault = _fault(text, int(bad.argmax()), no_index) if bad.any() else ""
     return without(bad, Corners(indices, relative, sizes)), bad, fault
 
 
-def _columns(text: Bytes, heads: Ints, ends: Ints, slash: Flags) -> tuple[Ints, Flags]:
+def _columns(text: Bytes, heads: Ints, ends: Ints, slash: Flags) -> tuple[NDArray[np.uint8], Flags]:
     """Return which of a corner's three indices each number is, and which are preceded by something else than a space
     or by one or two slashes after a number. slash: whether there is one before the number, which starts at `heads`."""
     double = slash & (text[heads - 2] == SLASH)
@@ -198,7 +196,23 @@ def _columns(text: Bytes, heads: Ints, ends: Ints, slash: Flags) -> tuple[Ints, 
     odd = ~slash & (text[heads - 1] > SPACE)
     odd |= slash & (heads - np.concatenate([[0], ends[:-1]])[: len(ends)] != 1 + double)
     odd |= slash & after_slash & (double | _shifted(double | after_slash))
-    return slash + third.astype(np.int64), odd
+    return slash.view(np.uint8) + third.view(np.uint8), odd
+
+
+def _by_corner(values: NDArray[Any], slash: Flags, columns: NDArray[np.uint8], odd: Flags) -> NDArray[np.int32]:
+    """Return numbers by corner and column, (n, 3), 0 where there are none."""
+    rows = np.zeros((len(slash) - np.count_nonzero(slash), 3), np.int32)
+    same = len(values) // max(len(rows), 1)
+    if (
+        same * len(rows) == len(values)
+        and not odd.any()
+        and (columns.reshape(-1, max(same, 1)) == columns[:same]).all()
+    ):
+        rows[:, columns[:same]] = values.reshape(-1, max(same, 1))
+    else:
+        places = 3 * (np.cumsum(~slash) - 1) + columns
+        rows.reshape(-1)[places[~odd]] = values[~odd]
+    return rows
 
 
 def _shifted(flags: Flags) -> Flags:

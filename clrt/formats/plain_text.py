@@ -1,20 +1,19 @@
-"""Text of Wavefront files: encodings, line breaks and continued lines."""
+"""Text of model files: encodings, line breaks and continued lines."""
 
 from __future__ import annotations
 
 import codecs
 import re
 
-from ...errors import SceneError
+from ..errors import SceneError
 
 #: Control characters other than line feeds become spaces.
 BLANKS = bytes(ord("\n") if byte == ord("\n") else max(byte, ord(" ")) for byte in range(256))
 CONTINUED = re.compile(rb"^([^#\n]*)\\ *\n", re.MULTILINE)
-INDENT = re.compile(rb"^ +", re.MULTILINE)
 
 
 def plain_text(content: bytes, first: bool = True) -> bytes:
-    """Return lines that end with line feeds, are not indented and contain no tabs, with continued lines joined.
+    """Return lines that end with line feeds and contain no tabs, with continued lines joined.
 
     first: whether it is the file's beginning, which may have a byte order mark. Raises SceneError for UTF-16.
     """
@@ -28,6 +27,4 @@ def plain_text(content: bytes, first: bool = True) -> bytes:
         content = content.translate(BLANKS)
     if b"\\" in content:
         content = CONTINUED.sub(rb"\1 ", content)
-    if content.startswith(b" ") or b"\n " in content:
-        content = INDENT.sub(b"", content)
     return content
