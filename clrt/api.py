@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .file_names import StrPath
 from .float_errors import with_default_errors
 from .formats.load_scene import load as _load
+from .formats.up_axis import Unit
 from .output.data_images import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
@@ -20,17 +21,18 @@ from .rendering.renderer import Renderer
 from .rendering.renderer_options import SETTINGS, RendererOptions
 from .rendering.stop_conditions import planned_spp
 from .scene.camera_path import frames as _frames
-from .scene.model import Scene
+from .scene.model import Axis, Scene
 
 
 @with_default_errors
-def load(path: StrPath, camera: str | None = None) -> Scene:
+def load(path: StrPath, camera: str | None = None, up: Axis | None = None, unit: Unit | None = None) -> Scene:
     """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (.glb .gltf .obj .ply .stl .off).
 
-    camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left".
-    Raises SceneError, which lists all problems.
+    camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left". For a
+    bare model also up: which of its axes points up, "x", "y" or "z"; unit: that of its coordinates, "m", "cm", "mm",
+    "in" or "ft", which become meters. Raises SceneError, which lists all problems.
     """
-    return _load(path, camera)
+    return _load(path, camera, up, unit)
 
 
 @listed(RendererOptions, SETTINGS)

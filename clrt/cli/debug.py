@@ -10,6 +10,7 @@ import click
 
 from . import PROGRAM
 from .guard import guarded
+from .load_options import LoadOptions
 from .option_types import Pixel
 from .options import picture_options, tracing_options
 
@@ -42,7 +43,7 @@ def command(
     samples: int,
     device: str | None,
     as_json: bool,
-    camera: str | None,
+    loading: LoadOptions,
     **given: Any,
 ) -> None:
     """Show the light paths of one pixel of SCENE, and why it is black or where its light comes from. With the options
@@ -55,11 +56,10 @@ def command(
     from ..debug.trace import trace_pixel
     from ..debug.vertices import vertices
     from ..device.open import open_device
-    from ..formats.load_scene import load
     from ..output.json_text import json_text
     from ..rendering.renderer_options import choices_of, settings_of
 
-    content = load(scene, camera)
+    content = loading.load(scene)
     content.render = settings = settings_of(content.render, given)
     pixel = pixel or (settings.size[0] // 2, settings.size[1] // 2)
     paths = trace_pixel(content, open_device(device), pixel, choices_of(given))

@@ -14,6 +14,7 @@ from .farm import ClusterOptions, cluster_for
 from .frames import FrameOptions
 from .guard import guarded
 from .interrupt import end_by_signals
+from .load_options import LoadOptions
 from .logs import silence, verbose_option
 from .option_groups import grouped
 from .options import picture_options, tracing_options
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 @tracing_options
 def command(
     scene: Path,
-    camera: str | None,
+    loading: LoadOptions,
     devices: tuple[str, ...],
     asked: OutputOptions,
     stop: StopOptions,
@@ -64,7 +65,7 @@ def command(
     load_writer()
     job = RenderJob(
         scene,
-        camera,
+        loading,
         asked,
         stop,
         saving,

@@ -18,6 +18,7 @@ from .farm import is_huge, make_renderer, render_frames, render_huge
 from .frames import FrameOptions, FrameSequence, make_sequence
 from .goal import Goal
 from .interrupt import Interruptible
+from .load_options import LoadOptions
 from .outputs import Outputs
 from .pipes import split_pipes
 from .progress import Progress
@@ -42,7 +43,7 @@ class RenderJob:
     """A render as requested. options: the keywords of the renderer that the command line has by the same names."""
 
     scene: Path
-    camera: str | None
+    loading: LoadOptions
     asked: OutputOptions
     stop: StopOptions
     saving: SavingOptions
@@ -124,12 +125,11 @@ class RenderJob:
 
     def _load(self, progress: Progress) -> Scene:
         """Return the scene, or that of the first frame, once no output would replace one of its files."""
-        from ..formats.load_scene import load
         from ..formats.referenced_files import files_read
 
         progress.phase("load")
         with files_read() as inputs:
-            content = load(self.scene, self.camera)
+            content = self.loading.load(self.scene)
         if self.sequence is None:
             self.results.check_apart(inputs, self.saving.checkpoint)
         else:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from .materials.textures import NonNegative
 from .render_settings import RenderSettings as RenderSettings
 
 Vector = tuple[float, float, float]
+Axis = Literal["x", "y", "z"]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]
@@ -86,12 +87,14 @@ class Instance:
 
 @dataclass(eq=False, kw_only=True)
 class Model:
-    """Content of a model file: meshes or instances, at least one, cameras by name in file order, and lights."""
+    """Content of a model file: meshes or instances, at least one, cameras by name in file order, and lights; up: which
+    of the file's axes points up."""
 
     meshes: list[Mesh]
     instances: list[Instance] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
     lights: list[Light] = field(default_factory=list)
+    up: Axis = "y"
 
 
 @dataclass(frozen=True, kw_only=True)

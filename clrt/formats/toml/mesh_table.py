@@ -14,10 +14,12 @@ from ...scene.fields.limits import Ge, Le, Lt
 from ...scene.geometry.creases import creased
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals, choose_normals
+from ...scene.geometry.transform import Matrix
 from ...scene.materials.material_types import Diffuse
-from ...scene.model import Instance, Mesh, Model, Vector
+from ...scene.model import Axis, Instance, Mesh, Model, Vector
 from ...scene.validation.validate import mesh_problems
 from ..models import read_model
+from ..up_axis import Unit, upright
 from .placement import Transform
 
 Vertex = Annotated[int, Ge(0), Lt(2**31)]
@@ -38,6 +40,12 @@ class MeshTable(Transform):
     crease_degrees: Annotated[float, Ge(0), Le(180)] | None = None
     lights: bool = False
     visible: bool = True
+    up: Axis = "y"
+    unit: Unit = "m"
+
+    def to_world(self, where: str) -> Matrix:
+        """Return the table's transform, after that of its axes and unit. Raises SceneError as that of `Transform`."""
+        return super().to_world(where) @ upright(self.up, self.unit)
 
     def read(self, folder: Path, where: str) -> Model:
         """Read its file, which is relative to `folder`, or its vertices and faces, untransformed.
