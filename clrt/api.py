@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from .file_names import StrPath
 from .float_errors import with_default_errors
 from .formats.load_scene import load as _load
-from .formats.model_choice import ModelChoice
+from .formats.model_choice import LightUnit, ModelChoice
+from .formats.up_axis import Unit
 from .output.data_images import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
@@ -21,30 +22,38 @@ from .rendering.renderer import Renderer
 from .rendering.renderer_options import SETTINGS, RendererOptions
 from .rendering.stop_conditions import planned_spp
 from .scene.camera_path import frames as _frames
-from .scene.model import Scene
+from .scene.model import Axis, Scene
 
 
 @with_default_errors
 def load(
     path: StrPath,
     camera: str | None = None,
+    up: Axis | None = None,
+    unit: Unit | None = None,
     *,
     scene: str | int | None = None,
     variant: str | int | None = None,
     animation: str | int | None = None,
     time: float | None = None,
+    light_unit: LightUnit | None = None,
 ) -> Scene:
     """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (.glb .gltf .obj .ply .stl .off).
 
-    camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left".
+    camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left". For a
+    bare model also up: which of its axes points up, "x", "y" or "z"; unit: that of its coordinates, "m", "cm", "mm",
+    "in" or "ft", which become meters.
 
     Of a bare glTF file, by name or number: `scene` is one of its scenes, `variant` one of the variants of its materials
     (KHR_materials_variants), and `animation` one of its animations, which `animate` renders. time: the seconds at which
-    the animation, by default the first one, is shown as a still.
+    the animation, by default the first one, is shown as a still. light_unit: "photometric" for lights in candela and
+    lux, "radiometric" for W/sr and W/m², "blender" for watts; by default as the file's generator and their brightness
+    suggest.
 
     Raises SceneError, which lists all problems.
     """
-    return _load(path, camera, ModelChoice(scene=scene, variant=variant, animation=animation, time=time))
+    choice = ModelChoice(scene=scene, variant=variant, animation=animation, time=time, light_unit=light_unit)
+    return _load(path, camera, up, unit, choice)
 
 
 @listed(RendererOptions, SETTINGS)

@@ -26,6 +26,8 @@ from .formats.test_meshes import (
     stl_ascii,
     stl_binary,
 )
+from .formats.test_ply import XYZ, Element, written
+from .formats.test_stl import binary
 from .fuzz import FORMATS, LARGEST, OBJ
 from .scene.shapes import icosphere
 
@@ -107,6 +109,19 @@ def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
         "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
         "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n3 0 1 2\n"
     )
+    vertex: Element = ("vertex", XYZ, [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+    corners = [([0, 1, 2, 3], [0.5] * 8), ([0, 1, 2], [0.0] * 6)]
+    seams: Element = ("face", ["list uchar int vertex_indices", "list uchar float texcoord"], corners)
+    strips: Element = ("tristrips", ["list int int vertex_indices"], [([0, 1, 2, -1, 3, 2, 1, 0],)])
+    for name, elements in {
+        "seams.ply": [vertex, seams],
+        "strips.ply": [vertex, strips],
+        "points.ply": [vertex],
+    }.items():
+        (folder / name).write_bytes(written(elements, "binary_big_endian"))
+    (folder / "colors.stl").write_bytes(binary(np.eye(3)[None], b"COLOR=\1\2\3\4", [31]))
+    (folder / "colors.off").write_text("COFF\n3 1 0\n0 0 0 9 9 9\n1 0 0 9 9 9\n0 1 0 9 9 9\n3 0 1 2 8 8 8\n")
+    (folder / "old.hdr").write_bytes(b"#?RADIANCE\nEXPOSURE=2\n\n+X 2 -Y 2\n" + b"\7\7\7\201\1\1\1\3")
     (folder / "a.mtl").write_text(MTL)
     (folder / "b.obj").write_text(OBJ.replace("damaged", "a"))
     (folder / "a.toml").write_text(SCENE)

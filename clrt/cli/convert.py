@@ -7,17 +7,17 @@ from pathlib import Path
 import click
 
 from ..errors import UsageError
-from .options import CAMERA
+from .load_options import LoadOptions
+from .option_groups import grouped
 
 
 @click.command()
 @click.argument("model", type=click.Path(path_type=Path))
 @click.argument("scene", type=click.Path(path_type=Path), metavar="SCENE.toml")
-@click.option("--camera", metavar="NAME", help=CAMERA)
+@grouped("loading", LoadOptions)
 @click.option("--force", is_flag=True, help="Replace existing files, including read-only ones.")
-def command(model: Path, scene: Path, camera: str | None, force: bool) -> None:
+def command(model: Path, scene: Path, loading: LoadOptions, force: bool) -> None:
     """Write SCENE.toml, which renders like `clrt render MODEL`, with its camera, sky, lights and materials to edit."""
-    from ..formats.load_scene import load
     from ..formats.toml.writer import started
     from ..output.atomic_files import check_target
     from ..output.scenes import save_scene
@@ -29,5 +29,5 @@ def command(model: Path, scene: Path, camera: str | None, force: bool) -> None:
     if scene.exists() and not force:
         raise UsageError(f"{scene}: already exists; choose another file, or replace it with --force")
     check_target(scene)
-    save_scene(started(load(model, camera)), scene, force=force)
+    save_scene(started(loading.load(model)), scene, force=force)
     click.echo(str(scene))

@@ -10,8 +10,7 @@ import click
 
 from . import PROGRAM
 from .guard import guarded
-from .model_options import ModelOptions
-from .option_groups import grouped
+from .load_options import LoadOptions
 from .option_types import Pixel
 from .options import picture_options, tracing_options
 
@@ -37,7 +36,6 @@ from .options import picture_options, tracing_options
 @click.option("--device", metavar="SEL", help="Device: number, id, part of a name, cpu or gpu; see `clrt devices`.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @picture_options
-@grouped("model", ModelOptions)
 @tracing_options
 def command(
     scene: Path,
@@ -45,8 +43,7 @@ def command(
     samples: int,
     device: str | None,
     as_json: bool,
-    camera: str | None,
-    model: ModelOptions,
+    loading: LoadOptions,
     **given: Any,
 ) -> None:
     """Show the light paths of one pixel of SCENE, and why it is black or where its light comes from. With the options
@@ -59,11 +56,10 @@ def command(
     from ..debug.trace import trace_pixel
     from ..debug.vertices import vertices
     from ..device.open import open_device
-    from ..formats.load_scene import load
     from ..output.json_text import json_text
     from ..rendering.renderer_options import choices_of, settings_of
 
-    content = load(scene, camera, model.choice)
+    content = loading.load(scene)
     content.render = settings = settings_of(content.render, given)
     pixel = pixel or (settings.size[0] // 2, settings.size[1] // 2)
     paths = trace_pixel(content, open_device(device), pixel, choices_of(given))

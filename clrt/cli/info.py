@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .model_options import ModelOptions
+from .load_options import LoadOptions
 from .option_groups import grouped
 from .options import tracing_options
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     metavar="SEL",
     help="Device to compile for; see `clrt devices`. Default: the best, or a CPU if there is none.",
 )
-@grouped("model", ModelOptions)
+@grouped("loading", LoadOptions)
 @tracing_options
 def command(
     scene: Path | None,
@@ -34,7 +34,7 @@ def command(
     as_json: bool,
     aovs: tuple[str, ...],
     selector: str | None,
-    model: ModelOptions,
+    loading: LoadOptions,
     **chosen: Any,
 ) -> None:
     """Show what SCENE contains and what is compiled for it, without rendering; needs no device."""
@@ -46,7 +46,6 @@ def command(
         return
     if scene is None:
         raise click.UsageError("Missing argument 'SCENE'; give a scene file or a model, or --materials")
-    from ..formats.load_scene import load
     from ..output.json_text import json_text
     from ..rendering.aovs import chosen_aovs
     from ..rendering.compile.compile_scene import compile_scene
@@ -55,7 +54,7 @@ def command(
     from .scene_report import report_lines, scene_report
 
     names = chosen_aovs(",".join(aovs)) if aovs else ()
-    content = load(scene, choice=model.choice)
+    content = loading.load(scene)
     choices = choices_of({**chosen, "aovs": names})
     compiled = compile_scene(content, choices, device=_device(selector))
     report = {

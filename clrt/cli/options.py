@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import click
-
 from ..accel.methods import HitTests
 from ..rendering.compile.choices import Choices
 from ..scene.render_settings import RenderSettings
-from .option_groups import settings_options
+from .load_options import LoadOptions
+from .option_groups import grouped, settings_options
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-#: Help of --camera.
-CAMERA = "Camera of the scene or model file to use; see `clrt info`. For a bare model also: front, right, back, left."
 #: Options that are not called like their setting.
 NAMES = {"max_depth": "--depth"}
 
@@ -24,7 +21,7 @@ NAMES = {"max_depth": "--depth"}
 def picture_options(command: F) -> F:
     """Add the options that, together with the scene's own settings, determine every sample of an image."""
     command = settings_options(RenderSettings, NAMES, without=("spp",), defaults=False)(command)
-    return click.option("--camera", metavar="NAME", help=CAMERA)(command)
+    return cast(F, grouped("loading", LoadOptions)(command))
 
 
 def tracing_options(command: F) -> F:

@@ -14,8 +14,8 @@ from .farm import ClusterOptions, cluster_for
 from .frames import FrameOptions
 from .guard import guarded
 from .interrupt import end_by_signals
+from .load_options import LoadOptions
 from .logs import silence, verbose_option
-from .model_options import ModelOptions
 from .option_groups import grouped
 from .options import picture_options, tracing_options
 from .render_job import INTERRUPTED, RenderJob
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 @click.argument("scene", type=click.Path(path_type=Path))
 @grouped("asked", OutputOptions)
 @picture_options
-@grouped("model", ModelOptions)
 @grouped("stop", StopOptions)
 @click.option(
     "--device",
@@ -46,9 +45,8 @@ if TYPE_CHECKING:
 @tracing_options
 def command(
     scene: Path,
-    camera: str | None,
+    loading: LoadOptions,
     devices: tuple[str, ...],
-    model: ModelOptions,
     asked: OutputOptions,
     stop: StopOptions,
     saving: SavingOptions,
@@ -67,8 +65,7 @@ def command(
     load_writer()
     job = RenderJob(
         scene,
-        camera,
-        model,
+        loading,
         asked,
         stop,
         saving,

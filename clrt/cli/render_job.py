@@ -18,7 +18,7 @@ from .farm import is_huge, make_renderer, render_frames, render_huge
 from .frames import FrameOptions, FrameSequence, make_sequence
 from .goal import Goal
 from .interrupt import Interruptible
-from .model_options import ModelOptions
+from .load_options import LoadOptions
 from .outputs import Outputs
 from .pipes import split_pipes
 from .progress import Progress
@@ -43,8 +43,7 @@ class RenderJob:
     """A render as requested. options: the keywords of the renderer that the command line has by the same names."""
 
     scene: Path
-    camera: str | None
-    model: ModelOptions
+    loading: LoadOptions
     asked: OutputOptions
     stop: StopOptions
     saving: SavingOptions
@@ -94,7 +93,7 @@ class RenderJob:
         """Return the frames to render; None for a still image."""
         if not self.frames.many:
             return None
-        if self.frames.frames is not None and self.model.animation_time is not None:
+        if self.frames.frames is not None and self.loading.animation_time is not None:
             raise UsageError("--animation-time is the time of a still; leave it out, or leave out --frames")
         still_only = {"checkpoint": self.saving.checkpoint, "reference": self.asked.reference, "plot": self.asked.plot}
         return make_sequence(self.results, self.frames.frames, self.saving.resume, still_only)
@@ -128,12 +127,11 @@ class RenderJob:
 
     def _load(self, progress: Progress) -> Scene:
         """Return the scene, or that of the first frame, once no output would replace one of its files."""
-        from ..formats.load_scene import load
         from ..formats.referenced_files import files_read
 
         progress.phase("load")
         with files_read() as inputs:
-            content = load(self.scene, self.camera, self.model.choice, moving=self.frames.frames is not None)
+            content = self.loading.load(self.scene, moving=self.frames.frames is not None)
         if self.sequence is None:
             self.results.check_apart(inputs, self.saving.checkpoint)
         else:

@@ -14,15 +14,15 @@ from ..scene.render_settings import RenderSettings
 from . import PROGRAM
 from .guard import guarded
 from .interrupt import Interruptible
+from .load_options import LoadOptions
 from .logs import verbose_option
-from .model_options import ModelOptions
 from .option_groups import grouped, settings_options
-from .options import CAMERA, NAMES
+from .options import NAMES
 
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
-@click.option("--camera", metavar="NAME", help=CAMERA)
+@grouped("loading", LoadOptions)
 @settings_options(RenderSettings, NAMES, defaults=False)
 @click.option(
     "--device",
@@ -33,16 +33,9 @@ from .options import CAMERA, NAMES
 )
 @click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform; see `clrt render`.")
 @click.option("--exposure", default=0.0, metavar="EV", help="In stops.")
-@grouped("model", ModelOptions)
 @verbose_option
 def command(
-    scene: Path,
-    camera: str | None,
-    devices: tuple[str, ...],
-    view: str,
-    exposure: float,
-    model: ModelOptions,
-    **given: Any,
+    scene: Path, loading: LoadOptions, devices: tuple[str, ...], view: str, exposure: float, **given: Any
 ) -> None:
     """Show SCENE, a .toml scene or a model, in an interactive window: navigate, edit, watch it refine
     (docs/window.md)."""
@@ -52,7 +45,6 @@ def command(
 
     check_window()
     from ..device.discovery.discover import select
-    from ..formats.load_scene import load
     from ..live.settings import Settings
     from ..output.view_transform import check_view
     from ..scene.validation.field_types import field_problems
@@ -64,7 +56,7 @@ def command(
     chosen = {name: value for name, value in given.items() if value is not None}
     if problems := field_problems(RenderSettings, chosen, "render"):
         raise UsageError("\n".join(problems))
-    content = load(scene, camera, model.choice)
+    content = loading.load(scene)
     content.render = replace(content.render, **chosen)
     app = App(content, Settings(device=devices or None), DisplaySettings(view, exposure))
     with Interruptible(app.close) as interruptible:

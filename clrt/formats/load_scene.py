@@ -5,49 +5,59 @@ from __future__ import annotations
 import logging
 import sys
 import tomllib
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
-from ..errors import SceneError
+from ..errors import SceneError, UsageError
 from ..file_names import StrPath
 from ..scene.default_sky import SUN, default_sky
-from ..scene.geometry.transform import rotation, transform_light, transform_mesh
-from ..scene.model import Instance, Mesh, Model, Scene
+from ..scene.geometry.transform import rotation, transform_light
+from ..scene.model import Axis, Instance, Mesh, Model, Scene
 from ..scene.provenance import source_of_model
 from ..scene.validation.validate import scene_problems
 from .frame_model import VIEWS, frame
 from .model_choice import DEFAULT, ModelChoice
-from .models import FORMATS, SUFFIXES, read_model
+from .models import SUFFIXES, read_model
 from .referenced_files import check_file, name_of
+from .toml.instance_table import placed_animation
+from .toml.mesh_table import MeshTable
 from .toml.reader import SceneReader, camera_problems
+from .up_axis import Unit, upright
 
 log = logging.getLogger(__name__)
 #: Stands for a TOML scene on standard input; its file names are relative to the working directory.
 STDIN = Path("-")
 #: Number of poses of an animation that the camera of a bare model frames.
 POSES = 17
-#: How bare models are rotated if +Z is up in their format and −Y the front.
-UPRIGHT = (-90.0, 0.0, 0.0)
 
 
-def load(path: StrPath, camera: str | None = None, choice: ModelChoice = DEFAULT, moving: bool = False) -> Scene:
+def load(
+    path: StrPath,
+    camera: str | None = None,
+    up: Axis | None = None,
+    unit: Unit | None = None,
+    choice: ModelChoice = DEFAULT,
+    moving: bool = False,
+) -> Scene:
     """Load a scene from a .toml file, a Mitsuba .xml file, a model file (whose meshes get a sky, a sun and a camera),
     or from standard input for "-".
 
     A glTF model's first camera and its lights are used if it has any. camera: name of another camera to use, of a scene
-    or a model file, or for a model one of VIEWS; choice: for bare models; moving: whether a camera that frames a model
-    frames its animation, as it does if one is chosen. Raises one SceneError with all problems of the file, each as
-    "FILE: object: value is wrong; remedy".
+    or a model file, or for a model one of VIEWS. up, unit: of a model file, if they are not as it or its format says;
+    choice: for bare models; moving: whether a camera that frames a model frames its animation, as it does if one is
+    chosen. Raises one SceneError with all problems of the file, each as "FILE: object: value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
         raise SceneError(f'{path!r} is not the path of a scene; give a file name, such as "scene.toml"')
     path = Path(path)
     check_scene(path)
     reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower())
+    if reader and (up or unit):
+        raise UsageError(f'{path}: up and unit are for model files; in a scene file, write up = "z" in a [[mesh]]')
     if reader and choice != DEFAULT:
         raise SceneError(f"{path}: {choice.given()[0]}: is for bare models; leave {choice.given()[0]} out")
-    scene, problems = reader(path) if reader else (_load_model(path, camera, choice, moving), [])
+    scene, problems = reader(path) if reader else (_load_model(path, camera, up, unit, choice, moving), [])
     views = [] if reader else [name for name in VIEWS if name not in scene.cameras]
     if camera is not None and camera not in views:
         scene.camera = scene.cameras.get(camera, scene.camera)
@@ -68,16 +78,19 @@ def check_scene(path: Path) -> None:
         raise SceneError(f"{path}: a scene must be one of {', '.join((*_READERS, *SUFFIXES))}; convert it")
 
 
-def _load_model(path: Path, view: str | None, choice: ModelChoice, moving: bool) -> Scene:
+def _load_model(
+    path: Path, view: str | None, up: Axis | None, unit: Unit | None, choice: ModelChoice, moving: bool
+) -> Scene:
     """Load a bare model with the default sky, its own lights or the sun, and its first camera or one that frames it.
 
-    view: one of VIEWS replaces the model's cameras, except one of that name; choice, moving: see `load`.
+    view: one of VIEWS replaces the model's cameras, except one of that name. up, unit: those of the file if None;
+    choice, moving: see `load`.
     """
     model = read_model(path, choice=choice)
-    placing: dict[str, Any] = {}
-    if FORMATS[path.suffix.lower()].z_up:
-        placing = {"rotate_degrees": UPRIGHT}
-        model.meshes = [transform_mesh(mesh, rotation(UPRIGHT)) for mesh in model.meshes]
+    placing = {"up": up or model.up, "unit": unit or "m"}
+    placing = {key: value for key, value in placing.items() if value != getattr(MeshTable, key)}
+    if placing:
+        model = placed_animation(model, upright(up or model.up, unit or "m"))
     angle = None if view is None or view in model.cameras else VIEWS.get(view)
     turn = rotation((0.0, angle or 0.0, 0.0))
     camera = next(iter(model.cameras.values()), None) if angle is None else None
@@ -91,7 +104,7 @@ def _load_model(path: Path, view: str | None, choice: ModelChoice, moving: bool)
         lights=model.lights or [sun],
         name=name_of(path),
         animation=model.animation,
-        source=source_of_model(path, model, placing, whole=choice == DEFAULT),
+        source=source_of_model(path, model, placing, whole=replace(choice, light_unit=None) == DEFAULT),
     )
 
 

@@ -1,34 +1,40 @@
-"""What is read of a model file that holds several scenes, animations or variants."""
+"""What is read of a model file that holds several scenes, animations or variants, and in which units."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from math import isfinite
+from typing import Literal, get_args
 
 from ..errors import SceneError, UsageError
 from ..scene.validation.field_types import show
 
 Named = str | int
+LightUnit = Literal["photometric", "radiometric", "blender"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelChoice:
-    """Parts of a glTF file by name or number; None for the file's default.
+    """Parts of a glTF file by name or number, and the unit of its lights; None for the file's default.
 
     - scene: which of its scenes
     - animation: which of its animations; None for the pose without any
     - variant: which of its variants of materials (KHR_materials_variants)
     - time: in seconds, at which the animation, by default the first one, is read as a still
+    - light_unit: of its lights (see gltf/light_units.py)
     """
 
     scene: Named | None = None
     animation: Named | None = None
     variant: Named | None = None
     time: float | None = None
+    light_unit: LightUnit | None = None
 
     def __post_init__(self) -> None:
-        """Raise UsageError for a time that is not a finite number."""
+        """Raise UsageError for a time that is not a finite number, and for an unknown unit."""
+        if self.light_unit not in (None, *get_args(LightUnit)):
+            raise UsageError(f"light_unit is {self.light_unit!r}; give one of {', '.join(get_args(LightUnit))}")
         if self.time is not None and not (isinstance(self.time, int | float) and isfinite(self.time)):
             raise UsageError(f"time is {self.time!r}; give seconds")
 

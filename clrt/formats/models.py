@@ -1,9 +1,8 @@
-"""Model file reading. STL and uncommon PLY files use trimesh's parsers; other readers are our own.
+"""Model file reading: a reader for each format, and what is alike for those without materials of their own.
 
 To add a format: write its reader, and its entry in FORMATS, where the scene file, `load` and the command line find it.
 
-The parsers are called directly, since a trimesh.Trimesh does not say whether the file had normals. They pass on NaN
-and invalid indices and raise arbitrary exceptions, so all they return is validated here.
+Parsers name arrays as trimesh does. They may pass on NaN and invalid indices, so all they return is validated here.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ from ..scene.geometry.normals import Normals, choose_normals
 from ..scene.materials.material import BELOW_ONE
 from ..scene.materials.material_types import Diffuse
 from ..scene.model import Mesh, Model
-from ..scene.validation.validate import mesh_problems
+from ..scene.validation.validate import index_problems, mesh_problems
 from .images.image_reader import linear_from_srgb
 from .model_choice import DEFAULT, ModelChoice
 from .polygons import triangulate
@@ -42,21 +41,22 @@ def read_mesh(path: StrPath, normals: Normals = "file") -> list[Mesh]:
 def read_model(path: StrPath, normals: Normals = "file", choice: ModelChoice = DEFAULT) -> Model:
     """Read a model file: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
 
-    Polygons are triangulated. `normals`: see `choose_normals`; choice: for glTF files. Raises SceneError naming the file,
-    the mesh, and the index or vertex that is wrong.
+    Polygons are triangulated. `normals`: see `choose_normals`; choice: for glTF files. Raises SceneError naming the
+    file, the mesh, and the index or vertex that is wrong.
     """
     path = Path(path)
-    format = FORMATS.get(path.suffix.lower())
-    if format is None:
+    suffix = path.suffix.lower()
+    read = FORMATS.get(suffix)
+    if read is None:
         raise SceneError(f"{path}: a model must be one of {', '.join(SUFFIXES)}; convert it")
     check_file(path, "model")
-    if format.chooses:
-        return format.read(path, normals, choice)
+    if suffix in CHOOSING:
+        return read(path, normals, choice)
     if choice != DEFAULT:
         raise SceneError(
             f"{path}: {choice.given()[0]}: only a glTF file has several to choose from; leave {choice.given()[0]} out"
         )
-    return format.read(path, normals)
+    return read(path, normals)
 
 
 def _gltf(path: Path, normals: Normals, choice: ModelChoice) -> Model:
@@ -91,36 +91,31 @@ def _off(path: Path) -> dict[str, Any]:
 
 def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals], Model]:
     """Return a reader from a parser, which returns the keyword arguments of trimesh's classes for one mesh (vertices,
-    faces, vertex_normals, uv, vertex_colors), or for several by name in `geometry`; it may raise anything."""
+    faces, vertex_normals, uv, vertex_colors), or for several by name in `geometry`, and which axis is `up` unless it is
+    y; it may raise anything."""
 
     def read(path: Path, normals: Normals) -> Model:
         try:
-            return Model(meshes=_meshes(_parsed(parse, path), name_of(path), normals))
+            parts = _parsed(parse, path)
+            return Model(meshes=_meshes(parts, name_of(path), normals), up=parts.get("up", "y"))
         except SceneError as error:
             raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
     return read
 
 
-class ModelFormat(NamedTuple):
-    """Format of model files. read: its reader, which raises SceneError naming the file; z_up: whether +Z is up and −Y
-    the front, as in CAD and 3D printing; chooses: whether the reader's last argument is a ModelChoice."""
-
-    read: Callable[..., Model]
-    z_up: bool = False
-    chooses: bool = False
-
-
-#: Model formats by suffix.
-FORMATS = {
-    ".glb": ModelFormat(_gltf, chooses=True),
-    ".gltf": ModelFormat(_gltf, chooses=True),
-    ".obj": ModelFormat(of_parts(_obj)),
-    ".ply": ModelFormat(of_parts(_ply)),
-    ".stl": ModelFormat(of_parts(_stl), z_up=True),
-    ".off": ModelFormat(of_parts(_off)),
+#: Readers of model files by suffix, which raise SceneError naming the file.
+FORMATS: dict[str, Callable[..., Model]] = {
+    ".glb": _gltf,
+    ".gltf": _gltf,
+    ".obj": of_parts(_obj),
+    ".ply": of_parts(_ply),
+    ".stl": of_parts(_stl),
+    ".off": of_parts(_off),
 }
 SUFFIXES = tuple(FORMATS)
+#: Formats whose readers' last argument is a ModelChoice.
+CHOOSING = {".glb", ".gltf"}
 
 
 def _parsed(parse: Callable[[Path], dict[str, Any]], path: Path) -> dict[str, Any]:
@@ -208,7 +203,7 @@ def _linear_colors(colors: Any) -> NDArray[np.float32] | None:
     return np.concatenate([linear, alpha], axis=1) if alpha.any() and (alpha < 1).any() else linear
 
 
-def _triangles(vertices: NDArray[np.float32], polygons: NDArray[np.integer], name: str) -> NDArray[np.integer]:
+def _triangles(vertices: NDArray[np.float32], polygons: NDArray[Any], name: str) -> NDArray[Any]:
     """Split polygons of k corners, (m, k), into k − 2 triangles each."""
     if polygons.ndim != 2 or polygons.shape[1] < 3:
         raise SceneError(f'mesh "{name}": its faces have fewer than 3 corners; export triangles')

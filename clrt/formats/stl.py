@@ -39,7 +39,10 @@ PLAIN = 0.9063
 
 def parse_stl(path: Path) -> dict[str, Any]:
     """Read an STL file, with trimesh's names of arrays: vertices (3m, 3), faces (m, 3), vertex_colors (3m, 3) or None;
-    of the solids of a text file in `geometry`, by name. Raises SceneError for malformed vertices."""
+    those of a text file's solids are in `geometry`, by name. +Z is up, as in CAD.
+
+    Raises SceneError for malformed vertices.
+    """
     content = path.read_bytes()
     if _is_binary(content):
         return _binary(content)
@@ -49,7 +52,7 @@ def parse_stl(path: Path) -> dict[str, Any]:
     for name, text in _solids(content):
         if len(corners := _corners(text)):
             solids[free_name(printable(name) or name_of(path), solids)] = _soup(corners)
-    return {"geometry": solids}
+    return {"geometry": solids, "up": "z"}
 
 
 def _is_binary(content: bytes) -> bool:
@@ -74,7 +77,7 @@ def _binary(content: bytes) -> dict[str, Any]:
     corners = np.ndarray(count, "V36", content, HEADER + 12, FACET).copy().view("<f4").reshape(-1, 3)
     attributes = np.ndarray(count, "<u2", content, HEADER + 48, FACET)
     colors = _colors(content[:80], attributes)
-    return _soup(corners) | {"vertex_colors": None if colors is None else np.repeat(colors, 3, axis=0)}
+    return _soup(corners) | {"up": "z", "vertex_colors": None if colors is None else np.repeat(colors, 3, axis=0)}
 
 
 def _colors(header: bytes, attributes: NDArray[np.uint16]) -> NDArray[np.float32] | None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from .materials.textures import NonNegative
 from .render_settings import RenderSettings as RenderSettings
 
 Vector = tuple[float, float, float]
+Axis = Literal["x", "y", "z"]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]
@@ -90,6 +91,7 @@ class Model:
 
     - animation: the file's first one, or the one that was chosen
     - contents: names of all that can be chosen, by kind: scenes, animations, variants
+    - up: which of the file's axes points up
     """
 
     meshes: list[Mesh]
@@ -98,6 +100,7 @@ class Model:
     lights: list[Light] = field(default_factory=list)
     animation: ModelAnimation | None = None
     contents: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    up: Axis = "y"
 
 
 @dataclass(frozen=True, kw_only=True)

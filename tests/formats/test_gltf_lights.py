@@ -11,6 +11,7 @@ import pytest
 
 from clrt.errors import SceneError
 from clrt.formats.load_scene import load
+from clrt.formats.model_choice import LightUnit, ModelChoice
 from clrt.output.scenes import save_scene
 from clrt.scene.default_sky import SUN
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
@@ -34,8 +35,7 @@ def held(index: int) -> dict[str, Any]:
 
 
 def test_lights_stand_where_their_nodes_do(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """They have the world position and −Z of their nodes; scales do not affect intensity. candela are W/sr, lux
-    W/m²."""
+    """They have the world position and −Z of their nodes; scales do not affect intensity."""
     cone = {"innerConeAngle": math.pi / 12, "outerConeAngle": math.pi / 6}
     gltf = lit(
         {"type": "point", "color": [1, 0.5, 0.25], "intensity": 40, "name": "bulb"},
@@ -49,7 +49,7 @@ def test_lights_stand_where_their_nodes_do(tmp_path: Path, caplog: pytest.LogCap
     gltf.node(translation=[0, 5, 0], scale=[9, 9, 9], extensions=held(0))
     gltf.node(rotation=DOWN, extensions=held(1))
     gltf.node(extensions=held(3))
-    scene = load(gltf.write(tmp_path / "lamps.glb"))
+    scene = load(gltf.write(tmp_path / "lamps.glb"), choice=ModelChoice(light_unit="radiometric"))
     spot, point, sun, default = scene.lights
     assert isinstance(spot, SpotLight) and isinstance(sun, DirectionalLight)
     assert point == PointLight(position=(0, 5, 0), intensity=(40, 20, 10))
@@ -61,6 +61,101 @@ def test_lights_stand_where_their_nodes_do(tmp_path: Path, caplog: pytest.LogCap
     assert (spot.inner_degrees, spot.outer_degrees) == pytest.approx((15, 30))
     assert default == SpotLight(position=(0, 0, 0), direction=(0, 0, -1), intensity=(1, 1, 1))
     assert not caplog.records
+
+
+def blender_lights(mode: str, sun: float, watts: float, energy: float = 1.0) -> list[dict[str, Any]]:
+    """Return what Blender's exporter writes for a sun, a point and a spot light, in W/m² and W: its __gather_intensity
+    in the lighting modes SPEC, COMPAT and RAW. energy: a factor to all of them."""
+    lumens = 683 if mode == "SPEC" else 1
+    solid_angle = 1 if mode == "RAW" else 4 * math.pi
+    strengths = {
+        "directional": sun * lumens,
+        "point": watts * lumens / solid_angle,
+        "spot": watts * lumens / solid_angle,
+    }
+    return [{"type": kind, "intensity": energy * strength} for kind, strength in strengths.items()]
+
+
+def one_of_each(lights: list[dict[str, Any]], generator: str) -> Gltf:
+    """Return a scene 8 wide with a sun, and with a point and a spot light 3 above it."""
+    gltf = Gltf()
+    corners = np.array([[-4, 0, -4], [4, 0, -4], [0, 0, 4]], np.float32)
+    gltf.mesh(attributes={"POSITION": gltf.accessor(corners)})
+    gltf.document["asset"]["generator"] = generator
+    gltf.document |= {"extensionsUsed": [NAME], "extensions": {NAME: {"lights": lights}}}
+    for index in range(len(lights)):
+        gltf.node(translation=[0, 3, 0], rotation=DOWN, extensions=held(index))
+    return gltf
+
+
+@pytest.mark.parametrize(
+    ("mode", "generator", "choice"),
+    [
+        ("SPEC", "Khronos glTF Blender I/O v4.2.57", None),
+        ("COMPAT", "Khronos glTF Blender I/O v4.2.57", None),
+        ("RAW", "Khronos glTF Blender I/O v4.2.57", "blender"),
+        ("RAW", "Khronos glTF Blender I/O v3.5.30", None),
+        ("RAW", "Khronos glTF Blender I/O v1.6.16", None),
+        ("RAW", "Khronos Blender glTF 2.0 I/O", None),
+    ],
+)
+@pytest.mark.parametrize("energy", [0.1, 1, 10])
+def test_blenders_lights_have_blenders_strength(
+    tmp_path: Path, mode: str, generator: str, choice: LightUnit | None, energy: float
+) -> None:
+    """By default a sun of 0.3 to 30 W/m², and lights of 100 W to 10 kW within the scene."""
+    gltf = one_of_each(blender_lights(mode, 3, 1000, energy), generator)
+    scene = load(gltf.write(tmp_path / "lights.glb"), choice=ModelChoice(light_unit=choice))
+    sun, point, spot = scene.lights
+    assert isinstance(sun, DirectionalLight) and isinstance(point, PointLight) and isinstance(spot, SpotLight)
+    assert sun.irradiance == pytest.approx([3 * energy] * 3)
+    assert point.intensity == spot.intensity == pytest.approx([1000 * energy / (4 * math.pi)] * 3)
+
+
+@pytest.mark.parametrize(
+    ("lights", "size", "unit"),
+    [
+        ([("point", 15), ("point", 80), ("point", 180)], 0.5, "photometric"),  # a room's lamp, by RapidCompact
+        ([("directional", 100_000)], 8, "photometric"),
+        ([("directional", 3)], 8, "radiometric"),  # as three.js and Babylon.js have suns
+        ([("point", 5), ("spot", 10), ("directional", 1)], 8, "radiometric"),
+        ([("point", 20_000)], 200, "radiometric"),
+    ],
+)
+def test_bright_lights_are_in_candela_and_lux(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, lights: list[tuple[str, float]], size: float, unit: str
+) -> None:
+    """Bright for the size of the scene; one line says so, unless the unit was given."""
+    gltf = lit(*({"type": kind, "intensity": strength} for kind, strength in lights))
+    gltf.document["nodes"][0]["scale"] = [size] * 3
+    for index in range(len(lights)):
+        gltf.node(rotation=DOWN, extensions=held(index))
+    file = gltf.write(tmp_path / "lights.glb")
+    found = load(file).lights
+    assert len(caplog.records) == (unit == "photometric")
+    assert not caplog.records or "candela and lux" in caplog.text and "--light-unit radiometric" in caplog.text
+    caplog.clear()
+    expected = [strength / (683 if unit == "photometric" else 1) for _, strength in lights]
+    assert [getattr(light, "intensity", getattr(light, "irradiance", None))[0] for light in found] == pytest.approx(
+        expected
+    )
+    assert load(file, choice=ModelChoice(light_unit=unit)).lights == found  # type: ignore[arg-type]
+    assert not caplog.records
+
+
+def test_units_of_scene_files(tmp_path: Path) -> None:
+    gltf = lit({"type": "directional", "intensity": 6830})
+    gltf.node(rotation=DOWN, extensions=held(0))
+    gltf.write(tmp_path / "sun.glb")
+    scene = tmp_path / "scene.toml"
+    for unit, irradiance in {None: 10, "photometric": 10, "radiometric": 6830, "blender": 6830}.items():
+        line = "" if unit is None else f'light_unit = "{unit}"\n'
+        scene.write_text(f'[[mesh]]\nfile = "sun.glb"\nlights = true\n{line}')
+        (sun,) = load(scene).lights
+        assert isinstance(sun, DirectionalLight) and sun.irradiance == pytest.approx([irradiance] * 3)
+    scene.write_text('[[mesh]]\nfile = "sun.glb"\nlight_unit = "lumen"\n')
+    with pytest.raises(SceneError, match=r'light_unit: "lumen".*photometric'):
+        load(scene)
 
 
 def test_models_without_lights_have_the_sun(tmp_path: Path) -> None:
@@ -116,7 +211,7 @@ def test_a_scene_file_asks_for_a_models_lights(tmp_path: Path) -> None:
         ({"type": "point", "intensity": -1}, r"lights\[0\].intensity: .*greater than or equal to 0"),
         ({"type": "point", "color": [1, 1]}, r"lights\[0\].color"),
         ({"type": "spot", "spot": {"outerConeAngle": 2}}, r"lights\[0\].spot.outerConeAngle: "),
-        ({"type": "point", "intensity": 1e39}, r"light\[0\].intensity: .* is outside the range of float32"),
+        ({"type": "point", "intensity": 1e42}, r"light\[0\].intensity: .* is outside the range of float32"),
     ],
 )
 def test_mistakes_are_named(tmp_path: Path, light: dict[str, Any], words: str) -> None:

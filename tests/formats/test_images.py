@@ -240,7 +240,7 @@ def test_orientations_of_radiance_images(size: str, axes: str, coded: str, tmp_p
     if axes == "XY":
         y, x = size[:4], size[5:]
         size, stored_pixels = f"{x} {y}", stored_pixels.transpose(1, 0, 2)
-    body = {"rows": by_channel, "pixels": by_pixel, "not": np.ndarray.tobytes}[coded](stored_pixels)
+    body = {"rows": by_channel, "pixels": by_pixel}.get(coded, lambda each: each.tobytes())(stored_pixels)
     head = f"#?RADIANCE\nmade by hand\nFORMAT=32-bit_rle_rgbe\n\n{size}\n"
     (tmp_path / "a.hdr").write_bytes(head.encode() + body)
     np.testing.assert_array_equal(read_picture(tmp_path / "a.hdr"), pixels[..., :3] * np.float32(2**-7))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def test_as_trimesh_reads_them(tmp_path_factory: pytest.TempPathFactory, count: 
     points, faces = random.normal(size=(count + 2, 3)), random.integers(0, count + 2, (count, 3))
     content = f"{head}{count + 2} {count} 0\n" + rows(points) + rows(np.full(count, 3), faces)
     mesh = read(tmp_path_factory.mktemp("off") / "a.off", content)
-    theirs = trimesh.load(io.StringIO(content), file_type="off", process=False)
+    theirs: Any = trimesh.load(io.StringIO(content), file_type="off", process=False)
     np.testing.assert_array_equal(mesh.vertices, theirs.vertices.astype(np.float32))
     np.testing.assert_array_equal(mesh.faces, theirs.faces)
 
@@ -54,6 +55,7 @@ def test_first_lines(head: str, tmp_path: Path) -> None:
 def test_colors_of_vertices(white: float, alpha: bool, tmp_path: Path) -> None:
     colors = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 0.2], [1, 1, 1, 1]])[:, : 3 + alpha] * white
     mesh = read(tmp_path / "a.off", "COFF\n4 2 0\n" + rows(SQUARE, colors) + FACES)
+    assert mesh.colors is not None
     np.testing.assert_allclose(mesh.colors, colors / white, atol=1e-6)
 
 
@@ -64,10 +66,10 @@ def test_colors_of_faces(tmp_path: Path) -> None:
     )
     assert mesh.colors is not None
     plain = linear_from_srgb(np.full(3, 0.9063, np.float32))
-    np.testing.assert_allclose(mesh.colors[mesh.faces][:, 1], [[1, 0, 0], [0, 0, 1], plain, plain])
+    np.testing.assert_allclose(mesh.colors[mesh.faces][:, 1], np.array([[1, 0, 0], [0, 0, 1], plain, plain]))
     np.testing.assert_allclose(plain, 0.8, atol=1e-4)
     np.testing.assert_array_equal(
-        mesh.vertices[mesh.faces], np.float32(SQUARE)[[[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]]
+        mesh.vertices[mesh.faces], np.array(SQUARE, np.float32)[[[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]]]
     )
 
 
@@ -79,6 +81,7 @@ def test_variants(tmp_path: Path) -> None:
         tmp_path / "a.off", "STCN4OFF\n4 2 0\n" + rows(np.array(SQUARE) * 2, np.full(4, 2), normals, colors, uv) + FACES
     )
     np.testing.assert_array_equal(mesh.vertices, SQUARE)
+    assert mesh.normals is not None
     np.testing.assert_allclose(mesh.normals, unit(normals), atol=1e-7)
     np.testing.assert_array_equal(mesh.colors, colors)
     np.testing.assert_array_equal(mesh.uv, np.column_stack([uv[:, 0], 1 - uv[:, 1]]))

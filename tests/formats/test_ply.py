@@ -20,7 +20,6 @@ from clrt.formats.models import read_mesh
 from clrt.formats.ply.points import spacing_radius
 from clrt.output.images import write_image
 from clrt.scene.geometry.transform import unit
-from clrt.scene.materials.textures import Texture
 from clrt.scene.model import Mesh
 
 from ..scene.shapes import volume
@@ -138,7 +137,7 @@ def test_trimesh_reads_the_same(encoding: str, tail: bytes, tmp_path: Path) -> N
     vertex = ("vertex", [*XYZ, "float nx", "float ny", "float nz", "uchar red", "uchar green", "uchar blue"], rows)
     face = ("face", CORNERS, [([0, 1, 2],), ([3, 4, 5],), ([8, 7, 6],)])
     content = written([vertex, face], encoding)
-    theirs = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
+    theirs: Any = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
     ours = read(tmp_path / "a.ply", content + tail)
     np.testing.assert_allclose(ours.vertices, theirs.vertices, atol=1e-7)
     np.testing.assert_array_equal(ours.faces, theirs.faces)
@@ -194,13 +193,15 @@ def test_textures(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
         rows.append(([0.0, 0.0, 1.0, 0.0, 1.0, 1.0], number, face))
     elements: list[Element] = [("vertex", XYZ, SQUARE), ("face", properties, rows)]
     single = read(tmp_path / "one.ply", written(elements, "ascii", ["TextureFile a b.png"]))
-    assert isinstance(single.material.color, Texture) and (single.material.color.picture.texels == 255).all()
+    (texture,) = single.material.textures()
+    assert (texture.picture.texels == 255).all()
     assert single.material_name == "a b.png" and not caplog.text
     comments = ["TextureFile C:\\models\\a b.png", "TextureFile b.png", "TextureFile lost.png"]
     (tmp_path / "many.ply").write_bytes(written(elements, "binary_little_endian", comments))
     meshes = read_mesh(tmp_path / "many.ply")
     assert [len(mesh.faces) for mesh in meshes] == [1, 1, 1]
-    texels = [mesh.material.color.picture.texels.max(axis=(0, 1)).tolist() for mesh in meshes[:2]]  # type: ignore[attr-defined]
+    textures = [texture for mesh in meshes for texture in mesh.material.textures()]
+    texels = [texture.picture.texels.max(axis=(0, 1)).tolist() for texture in textures]
     assert texels == [[255] * 4, [0, 0, 0, 255]]
     assert not meshes[2].material.textures() and "lost.png: no such picture file" in caplog.text
 
@@ -212,8 +213,7 @@ def test_textures(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
 def test_colors_of_every_type(kind: str, white: float, encoding: str, tmp_path: Path) -> None:
     """Of vertices and of faces; white is the greatest value of unsigned types, and 1 for floats."""
     properties = [f"{kind} {name}" for name in ("red", "green", "blue")]
-    rows = [(white, 0, 0), (0, white, 0), (0, 0, white)]
-    rows = [tuple(type(white)(value) for value in row) for row in rows]
+    rows = (np.eye(3) * white).astype(type(white)).tolist()
     vertices = ("vertex", [*XYZ, *properties], [(*p, *row) for p, row in zip(SQUARE, rows)])
     mesh = read(tmp_path / "a.ply", written([vertices, ("face", CORNERS, [([0, 1, 2],)])], encoding))
     np.testing.assert_array_equal(mesh.colors, np.eye(3))
@@ -230,6 +230,7 @@ def test_alpha(alphas: tuple[int, ...], kept: bool, tmp_path: Path) -> None:
     mesh = read(tmp_path / "a.ply", written([vertices, ("face", CORNERS, [([0, 1, 2],)])], "ascii"))
     expected = np.ones((3, 4))
     expected[:, 3] = np.array(alphas) / 255
+    assert mesh.colors is not None
     np.testing.assert_allclose(mesh.colors, expected if kept else expected[:, :3], atol=1e-7)
     assert (mesh.material.opacity != 1) == kept
 

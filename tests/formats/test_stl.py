@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import struct
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -70,11 +72,11 @@ def test_text_as_trimesh_reads_it(
     path = tmp_path_factory.mktemp("stl") / "a.stl"
     check(path, content, triangles)
     if newline == "\n":
-        theirs = trimesh.load(io.BytesIO(content.encode()), file_type="stl", process=False)
+        theirs: Any = trimesh.load(io.BytesIO(content.encode()), file_type="stl", process=False)
         np.testing.assert_array_equal(theirs.triangles.astype(np.float32), triangles)
 
 
-ODD = {
+ODD: dict[str, Callable[[str], str]] = {
     "no first line": lambda whole: whole.partition("\n")[2],
     "a comment first": lambda whole: "# exported by hand\n\n" + whole,
     "a byte order mark": lambda whole: "\ufeff" + whole,
@@ -134,7 +136,7 @@ def test_colors_of_viscam(tmp_path: Path) -> None:
     red, green = 0x8000 | 31 << 10, 0x8000 | 15 << 5
     mesh = read(tmp_path / "a.stl", binary(np.repeat(TRIANGLES, 2, 0)[:3], attributes=[red, green, 31]))
     assert mesh.colors is not None
-    half = linear_from_srgb(np.float32([15 / 31]))[0]
+    half = linear_from_srgb(np.array([15 / 31], np.float32))[0]
     expected = [[1, 0, 0], [0, half, 0], [0.8, 0.8, 0.8]]
     np.testing.assert_allclose(mesh.colors, np.repeat(expected, 3, 0), atol=1e-4)
     assert read(tmp_path / "b.stl", binary(TRIANGLES, attributes=[5, 0])).colors is None

@@ -12,40 +12,43 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from math import pi
-from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
+from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight, Vector
+from ..model_choice import LightUnit
 
-LightUnit = Literal["photometric", "radiometric", "blender"]
-UNITS: tuple[LightUnit, ...] = get_args(LightUnit)
 #: Luminous efficacy in lm/W of light of 555 nm, which defines the candela. Blender converts white light by it, too.
 EFFICACY = 683.0
 #: Irradiance of the brightest light above which it is taken as lux: it is near the geometric mean of what lights a
 #: scene well, 1 to 10 W/m², and of the same in lux.
 BRIGHTEST = 50.0
+#: What is said of lights that are converted.
+GUESSES: dict[LightUnit, str] = {
+    "photometric": "the lights are taken as candela and lux, and divided by 683 lm/W",
+    "blender": "the lights are taken as watts, which versions of Blender before 3.6 write",
+}
 #: Blender's exporter before version 3.6 wrote the numbers that Blender shows.
 OLD_BLENDER = re.compile(r"Khronos Blender glTF 2\.0|Khronos glTF Blender I/O v([0-2]\.|3\.[0-5]\.)")
 
 
-def guess_unit(
-    lights: Sequence[Light], generator: str | None, middle: np.typing.ArrayLike, radius: float
-) -> LightUnit:
+def guess_unit(lights: Sequence[Light], generator: str, box: NDArray[np.floating]) -> LightUnit:
     """Return the unit of a file's lights, by the program that wrote it and by how brightly they light the scene.
 
-    middle, radius: of the scene's bounding sphere.
+    box: the scene's bounds, (2, 3).
     """
-    if OLD_BLENDER.match(generator or ""):
+    if OLD_BLENDER.match(generator):
         return "blender"
-    irradiances = [_irradiance(light, np.asarray(middle), radius) for light in lights]
-    return "photometric" if max(irradiances, default=0.0) > BRIGHTEST else "radiometric"
+    brightest = max((_irradiance(light, box) for light in lights), default=0.0)
+    return "photometric" if brightest > BRIGHTEST else "radiometric"
 
 
-def _irradiance(light: Light, middle: np.typing.NDArray[np.float64], radius: float) -> float:
+def _irradiance(light: Light, box: NDArray[np.floating]) -> float:
     """Return the irradiance in the middle of the scene, or of a light in the scene, at the scene's radius."""
     if isinstance(light, PointLight | SpotLight):
-        distance = max(float(np.linalg.norm(np.subtract(light.position, middle))), radius)
+        distance = float(np.linalg.norm(light.position - box.mean(axis=0)))
+        distance = max(distance, float(np.linalg.norm(box[1] - box[0])) / 2)
         return max(light.intensity) / distance**2 if distance else 0.0
     assert isinstance(light, DirectionalLight)
     return max(light.irradiance)
@@ -54,8 +57,14 @@ def _irradiance(light: Light, middle: np.typing.NDArray[np.float64], radius: flo
 def to_radiometric(light: Light, unit: LightUnit) -> Light:
     """Return the light with its number in W/sr, or in W/m² if it is directional."""
     if isinstance(light, DirectionalLight):
-        factor = {"photometric": 1 / EFFICACY, "radiometric": 1.0, "blender": 1.0}[unit]
-        return replace(light, irradiance=tuple(factor * x for x in light.irradiance))
+        factor = 1 / EFFICACY if unit == "photometric" else 1.0
+        return replace(light, irradiance=_scaled(light.irradiance, factor))
     assert isinstance(light, PointLight | SpotLight)
     factor = {"photometric": 1 / EFFICACY, "radiometric": 1.0, "blender": 1 / (4 * pi)}[unit]
-    return replace(light, intensity=tuple(factor * x for x in light.intensity))
+    return replace(light, intensity=_scaled(light.intensity, factor))
+
+
+def _scaled(color: Vector, factor: float) -> Vector:
+    """Return the color times the factor."""
+    red, green, blue = color
+    return (factor * red, factor * green, factor * blue)

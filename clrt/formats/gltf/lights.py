@@ -1,7 +1,4 @@
-"""Lights of a glTF file (Khronos, KHR_lights_punctual).
-
-Photometric units are taken as radiometric ones, as glTF renderers do: candela for W/sr, lux for W/m².
-"""
+"""Lights of a glTF file (Khronos, KHR_lights_punctual)."""
 
 from __future__ import annotations
 
@@ -17,7 +14,10 @@ WIDEST_INNER = 0.9999
 
 
 def read_lights(document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix]]) -> Iterator[Light]:
-    """Yield the nodes' lights in world space: at the node's position, along its −Z, independent of its scale."""
+    """Yield the nodes' lights in world space: at the node's position, along its −Z, independent of its scale.
+
+    Their intensity and irradiance are the numbers of the file (see light_units.py).
+    """
     sources = document.extensions.KHR_lights_punctual.lights
     for node, matrix in nodes:
         if (used := node.extensions.KHR_lights_punctual) is None:

@@ -57,6 +57,7 @@ OPTIONAL = re.compile(
 
 class Asset(Part):
     version: str
+    generator: object = None
     minVersion: str | None = None
 
 

@@ -210,7 +210,7 @@ def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
     if vertex is None or found is None or points is None:
         return None
     face, fans = found[0], Fans(found[1])
-    if problems := index_problems(fans.vertices, vertex.count, f'mesh "{path.stem}"'):
+    if problems := index_problems(fans.vertices, vertex.number, f'mesh "{path.stem}"'):
         raise SceneError([f"{path}: {problem}" for problem in problems])
     mesh = Mesh(points, fans.vertices, name=path.stem)
     normals, uv = columns_of(vertex, ("nx", "ny", "nz")), coordinates_of(vertex)

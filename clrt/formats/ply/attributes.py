@@ -33,8 +33,8 @@ def coordinates_of(vertex: Columns) -> Array | None:
 
 def colors_of(columns: Columns) -> Array | None:
     """Return the colors of vertices or faces, (n, 3) or with alpha (n, 4), white at 1; None if there are none."""
-    names = next((names for names in COLORS if set(names) <= columns.scalars.keys()), ())
-    if not names or columns.count == 0:
+    names: tuple[str, ...] = next((names for names in COLORS if set(names) <= columns.scalars.keys()), ())
+    if not names or columns.number == 0:
         return None
     names = (*names, *(name for name in ("alpha", "a") if name in columns.scalars))[:4]
     white = np.array([WHITE.get(columns.kinds[name], 255) for name in names], np.float32)

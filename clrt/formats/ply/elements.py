@@ -35,7 +35,7 @@ class Lists(NamedTuple):
 class Columns(NamedTuple):
     """Properties of one element by name, which are scalars (n,) or lists; kinds: the types that the header names."""
 
-    count: int
+    number: int
     scalars: dict[str, Array]
     lists: dict[str, Lists]
     kinds: Mapping[str, str] = {}
@@ -62,7 +62,7 @@ def read_elements(content: bytes, wanted: Collection[str]) -> tuple[Header, dict
             columns, start = _records(content, start, element, order)
         except _Truncated as end:
             raise SceneError(
-                f"cannot be read as PLY: it ends or is damaged in {element.name} {end} of {element.count}; "
+                f"cannot be read as PLY: it ends or is damaged in {element.name} {end} of {element.number}; "
                 "export the model again"
             ) from None
         found[element.name] = columns._replace(kinds={each.name: each.kind for each in given.properties})
@@ -70,7 +70,7 @@ def read_elements(content: bytes, wanted: Collection[str]) -> tuple[Header, dict
 
 
 def _as_double(given: Property) -> Property:
-    return given._replace(kind="f8", count=given.count and "f8")
+    return given._replace(kind="f8", count_kind=given.count_kind and "f8")
 
 
 def _numbers(text: bytes) -> bytes:
@@ -85,14 +85,14 @@ def _numbers(text: bytes) -> bytes:
 
 def _records(content: bytes, start: int, element: Element, order: str) -> tuple[Columns, int]:
     """Return an element's properties, and where the next element starts. Raises _Truncated."""
-    if element.count == 0 or not element.properties:
+    if element.number == 0 or not element.properties:
         nothing = np.zeros(0)
         return Columns(
             0,
-            {each.name: nothing for each in element.properties if not each.count},
-            {each.name: Lists(nothing, nothing) for each in element.properties if each.count},
+            {each.name: nothing for each in element.properties if not each.count_kind},
+            {each.name: Lists(nothing, nothing) for each in element.properties if each.count_kind},
         ), start
-    first, _ = _uneven(content, start, element._replace(count=1), order)
+    first, _ = _uneven(content, start, element._replace(number=1), order)
     sizes = [int(each.counts[0]) for each in first.lists.values()]
     return _even(content, start, element, order, sizes) or _uneven(content, start, element, order)
 
@@ -100,42 +100,43 @@ def _records(content: bytes, start: int, element: Element, order: str) -> tuple[
 def _even(content: bytes, start: int, element: Element, order: str, sizes: Sequence[int]) -> tuple[Columns, int] | None:
     """Read records whose lists all have the lengths of those in the first record, `sizes`; None for others."""
     lengths = iter(sizes)
-    widths = [next(lengths) if each.count else 1 for each in element.properties]
-    record = sum(width * _size(each.kind) + _size(each.count) for each, width in zip(element.properties, widths))
-    if start + element.count * record > len(content):
+    widths = [next(lengths) if each.count_kind else 1 for each in element.properties]
+    record = sum(width * _size(each.kind) + _size(each.count_kind) for each, width in zip(element.properties, widths))
+    if start + element.number * record > len(content):
         return None
-    columns, place = Columns(element.count, {}, {}), start
+    columns, place = Columns(element.number, {}, {}), start
 
     def column(kind: str, width: int) -> Array:
         nonlocal place
         here, place = place, place + width * _size(kind)
         if width == 1:
-            return np.ndarray(element.count, order + kind, content, here, record)
-        block = np.ndarray(element.count, f"V{width * _size(kind)}", content, here, record)
+            return np.ndarray(element.number, order + kind, content, here, record)
+        block = np.ndarray(element.number, f"V{width * _size(kind)}", content, here, record)
         return block.copy().view(order + kind)  # three times as fast as a copy of single items
 
     for each, width in zip(element.properties, widths):
-        if each.count is None:
+        if each.count_kind is None:
             columns.scalars[each.name] = column(each.kind, 1)
             continue
-        counts = column(each.count, 1)
+        counts = column(each.count_kind, 1)
         if np.any(counts != width):
             return None
         columns.lists[each.name] = Lists(counts, column(each.kind, width))
-    return columns, start + element.count * record
+    return columns, start + element.number * record
 
 
 def _uneven(content: bytes, start: int, element: Element, order: str) -> tuple[Columns, int]:
     """Read records whose lists have any lengths. Raises _Truncated."""
     place, end = _starts(content, start, element, order)
-    columns = Columns(element.count, {}, {})
+    columns = Columns(element.number, {}, {})
     for each in element.properties:
-        if each.count is None:
+        if each.count_kind is None:
             columns.scalars[each.name] = _values(content, order + each.kind, place)
             place = place + _size(each.kind)
             continue
-        counts = _values(content, "u1" if _size(each.count) == 1 else order + each.count, place).astype(np.int64)
-        place = place + _size(each.count)
+        kind = "u1" if _size(each.count_kind) == 1 else order + each.count_kind
+        counts = _values(content, kind, place).astype(np.int64)
+        place = place + _size(each.count_kind)
         within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
         offsets = np.repeat(place, counts) + within * _size(each.kind)
         columns.lists[each.name] = Lists(counts, _values(content, order + each.kind, offsets))
@@ -148,13 +149,13 @@ def _starts(content: bytes, start: int, element: Element, order: str) -> tuple[N
     lists: list[tuple[int, Callable[[int], int], int, int]] = []
     gap = 0
     for each in element.properties:
-        if each.count is None:
+        if each.count_kind is None:
             gap += _size(each.kind)
         else:
-            lists.append((gap, _counter(content, order, each.count), _size(each.count), _size(each.kind)))
+            lists.append((gap, _counter(content, order, each.count_kind), _size(each.count_kind), _size(each.kind)))
             gap = 0
     starts, place, last = array("q"), start, len(content)
-    for number in range(element.count):
+    for number in range(element.number):
         starts.append(place)
         try:
             for before, count, own, size in lists:

@@ -33,18 +33,18 @@ KINDS = {
 
 
 class Property(NamedTuple):
-    """Property of an element. kind: its type, such as "f4"; count: the type of the counts if it is a list."""
+    """Property of an element. kind: its type, such as "f4"; count_kind: that of the counts if it is a list."""
 
     name: str
     kind: str
-    count: str | None = None
+    count_kind: str | None = None
 
 
 class Element(NamedTuple):
-    """Element: `count` records of the same properties."""
+    """Element: `number` records of the same properties."""
 
     name: str
-    count: int
+    number: int
     properties: list[Property]
 
 

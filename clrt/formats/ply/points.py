@@ -63,7 +63,7 @@ def spacing_radius(points: Doubles) -> float:
             high = middle
         else:
             low = middle
-    return FRACTION * extent * 2.0**high
+    return float(FRACTION * extent * 2.0**high)
 
 
 def _occupied(points: Doubles, edge: float) -> int:

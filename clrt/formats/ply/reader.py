@@ -37,12 +37,14 @@ def parse_ply(path: Path) -> dict[str, Any]:
     points = None if vertex is None else columns_of(vertex, ("x", "y", "z"))
     if vertex is None or points is None:
         raise SceneError("its vertices have no x, y and z; export the model again")
-    if sum(columns.count for columns in elements.values()) == vertex.count:
-        return point_spheres(points, vertex.scalars.get("radius"), colors_of(vertex))
+    # Coordinates of a reference system, as surveys name one in a comment, have the height as the last.
+    up = "z" if any(comment.lower().startswith("crs ") for comment in header.comments) else "y"
+    if sum(columns.number for columns in elements.values()) == vertex.number:
+        return point_spheres(points, vertex.scalars.get("radius"), colors_of(vertex)) | {"up": up}
     found = faces_of(elements)
     fans = None if found is None else Fans(found[1])
     faces = strip_triangles(elements) if fans is None else fans.vertices
-    if problems := index_problems(faces, vertex.count, f'mesh "{name_of(path)}"'):
+    if problems := index_problems(faces, vertex.number, f'mesh "{name_of(path)}"'):
         raise SceneError(problems)
     whole = {
         "vertices": _finite_where_unused(points, faces),
@@ -56,7 +58,7 @@ def parse_ply(path: Path) -> dict[str, Any]:
         whole = with_corner_attributes(whole, _of_corners(*found, fans, whole["vertex_colors"] is None))
         if "texnumber" in found[0].scalars:
             textures = found[0].scalars["texnumber"].astype(np.int64)[fans.polygons]
-    return {"geometry": _by_texture(path, header.comments, whole, textures)}
+    return {"geometry": _by_texture(path, header.comments, whole, textures), "up": up}
 
 
 def _finite_where_unused(points: Array, faces: Array) -> Array:
@@ -64,7 +66,7 @@ def _finite_where_unused(points: Array, faces: Array) -> Array:
     missing points."""
     if np.isfinite(points).all() or not len(faces):
         return points
-    bad = ~np.isfinite(points).all(axis=1)
+    bad = np.asarray(~np.isfinite(points).all(axis=1))
     bad[faces] = False
     points[bad] = points[faces[0, 0]]
     return points

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,8 @@ class Fans:
         self._all_triangles = len(polygons.items) == 3 * len(polygons.counts) and bool(np.all(polygons.counts == 3))
 
     @cached_property
-    def vertices(self) -> NDArray[np.integer]:
-        """(m, 3): the vertices of each triangle."""
+    def vertices(self) -> NDArray[Any]:
+        """(m, 3), of any integer dtype: the vertices of each triangle."""
         items = self._polygons.items
         items = items if np.issubdtype(items.dtype, np.integer) else items.astype(np.int64)
         return items.reshape(-1, 3) if self._all_triangles else items[self.corners]
@@ -50,7 +51,7 @@ def faces_of(elements: Mapping[str, Columns]) -> tuple[Columns, Lists] | None:
     """Return a file's faces and their vertices; None if it has none."""
     face = elements.get("face", Columns(0, {}, {}))
     lists = next((face.lists[name] for name in ("vertex_indices", "vertex_index") if name in face.lists), None)
-    return None if lists is None or not face.count else (face, lists)
+    return None if lists is None or not face.number else (face, lists)
 
 
 def strip_triangles(elements: Mapping[str, Columns]) -> Ints:
@@ -69,4 +70,5 @@ def strip_triangles(elements: Mapping[str, Columns]) -> Ints:
     triangles = np.stack([items[:-2], items[1:-1], items[2:]], axis=1)
     triangles[odd] = triangles[odd][:, [1, 0, 2]]
     a, b, c = triangles.T
-    return triangles[whole & (a != b) & (b != c) & (c != a)]
+    kept: Ints = triangles[whole & (a != b) & (b != c) & (c != a)]
+    return kept

@@ -97,8 +97,20 @@ def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray
     return np.concatenate(copies)
 
 
+def placed_animation(model: Model, matrix: Matrix) -> Model:
+    """Apply an affine matrix to a model and its animation."""
+    still, animation = placed(model, matrix, None, {}), model.animation
+    if animation is None:
+        return still
+    pose = animation.pose
+    return replace(
+        still, animation=replace(animation, base=still, pose=lambda seconds: placed(pose(seconds), matrix, None, {}))
+    )
+
+
 def placed(model: Model, matrix: Matrix, material: Material | None, others: dict[str, Material]) -> Model:
-    """Apply an affine matrix to a model. material: replaces its own; others: replacements by their own names."""
+    """Apply an affine matrix to a model, without its animation. material: replaces its own; others: replacements by
+    their own names."""
     meshes = [
         transform_mesh(replace(mesh, material=others.get(mesh.material_name, material or mesh.material)), matrix)
         for mesh in model.meshes
@@ -108,12 +120,8 @@ def placed(model: Model, matrix: Matrix, material: Material | None, others: dict
         for each in model.instances
     ]
     cameras = {name: transform_camera(camera, matrix) for name, camera in model.cameras.items()}
-    return Model(
-        meshes=meshes,
-        instances=instances,
-        cameras=cameras,
-        lights=[transform_light(light, matrix) for light in model.lights],
-    )
+    lights = [transform_light(light, matrix) for light in model.lights]
+    return replace(model, meshes=meshes, instances=instances, cameras=cameras, lights=lights, animation=None)
 
 
 def moved(instance: Instance, matrix: Matrix) -> Instance:

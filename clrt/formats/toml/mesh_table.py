@@ -14,11 +14,13 @@ from ...scene.fields.limits import Ge, Le, Lt
 from ...scene.geometry.creases import creased
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals, choose_normals
+from ...scene.geometry.transform import Matrix
 from ...scene.materials.material_types import Diffuse
-from ...scene.model import Instance, Mesh, Model, Vector
+from ...scene.model import Axis, Instance, Mesh, Model, Vector
 from ...scene.validation.validate import mesh_problems
-from ..model_choice import DEFAULT, ModelChoice
+from ..model_choice import DEFAULT, LightUnit, ModelChoice
 from ..models import read_model
+from ..up_axis import Unit, upright
 from .placement import Transform
 
 Vertex = Annotated[int, Ge(0), Lt(2**31)]
@@ -42,7 +44,14 @@ class MeshTable(Transform):
     normals: Normals = "file"
     crease_degrees: Annotated[float, Ge(0), Le(180)] | None = None
     lights: bool = False
+    light_unit: LightUnit | None = None
     visible: bool = True
+    up: Axis = "y"
+    unit: Unit = "m"
+
+    def to_world(self, where: str) -> Matrix:
+        """Return the table's transform, after that of its axes and unit. Raises SceneError as that of `Transform`."""
+        return super().to_world(where) @ upright(self.up, self.unit)
 
     def read(self, folder: Path, where: str) -> Model:
         """Read its file, which is relative to `folder`, or its vertices and faces, untransformed.
@@ -71,7 +80,9 @@ class MeshTable(Transform):
             raise SceneError(f"{where}: has both a file and vertices, faces or uv; keep one of them")
         # In a scene file the model is a still.
         time = 0.0 if self.animation is not None and self.time is None else self.time
-        choice = ModelChoice(scene=self.scene, variant=self.variant, animation=self.animation, time=time)
+        choice = ModelChoice(
+            scene=self.scene, variant=self.variant, animation=self.animation, time=time, light_unit=self.light_unit
+        )
         if self.file is not None:
             return self._from_file(self.file, choice, folder, where)
         if choice != DEFAULT:

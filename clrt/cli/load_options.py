@@ -1,0 +1,73 @@
+"""Options for loading a scene or a model, which several commands share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, get_args
+
+from ..formats.model_choice import LightUnit, ModelChoice
+from ..formats.up_axis import METERS, Unit
+from ..scene.model import Axis
+from .option_groups import flag
+from .option_types import Finite, OneOf
+
+if TYPE_CHECKING:
+    from ..scene.model import Scene
+
+
+@dataclass(frozen=True)
+class LoadOptions:
+    """How the file is read."""
+
+    camera: str | None = flag(
+        "--camera",
+        metavar="NAME",
+        help="Camera of the scene or model file to use; see `clrt info`. For a bare model also: front, right, back, "
+        "left.",
+    )
+    up: Axis | None = flag(
+        "--up",
+        type=OneOf(get_args(Axis)),
+        help="Axis of a bare model that points up. Default: what the file says, or z for .stl, y for others.",
+    )
+    unit: Unit | None = flag(
+        "--unit", type=OneOf(list(METERS)), help="Unit of a bare model's coordinates, to convert them to meters."
+    )
+
+    model_scene: str | None = flag(
+        "--scene", metavar="NAME", help="Scene of a bare glTF file, by name or number; see `clrt info`."
+    )
+    variant: str | None = flag(
+        "--variant", metavar="NAME", help="Variant of a bare glTF file's materials, by name or number."
+    )
+    animation: str | None = flag(
+        "--animation",
+        metavar="NAME",
+        help="Animation of a bare glTF file, by name or number; default: none, or with --frames the first.",
+    )
+    animation_time: float | None = flag(
+        "--animation-time",
+        type=Finite(),
+        metavar="SECONDS",
+        help="Time at which the animation, by default the first, is shown as a still.",
+    )
+    light_unit: LightUnit | None = flag(
+        "--light-unit",
+        type=OneOf(get_args(LightUnit)),
+        help="Unit of a bare glTF file's lights: candela and lux, W/sr and W/m², or Blender's watts. Default: by the "
+        "program that wrote the file, and by the lights' brightness.",
+    )
+
+    def load(self, path: Path, moving: bool = False) -> Scene:
+        """Load the scene or model. moving: whether its animation is rendered. Raises SceneError."""
+        from ..formats.load_scene import load
+
+        choice = ModelChoice(
+            scene=self.model_scene,
+            variant=self.variant,
+            animation=self.animation,
+            time=self.animation_time,
+            light_unit=self.light_unit,
+        )
+        return load(path, self.camera, self.up, self.unit, choice, moving)

@@ -1,0 +1,31 @@
+"""Axes and units of model files, which scenes have as +Y up and in units of the user's choice."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from ..errors import UsageError
+from ..scene.geometry.transform import Matrix, scaling
+from ..scene.model import Axis
+
+Unit = Literal["m", "cm", "mm", "in", "ft"]
+METERS: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+
+
+def upright(up: Axis, unit: Unit = "m") -> Matrix:
+    """Return the matrix from a file's coordinates, whose axis `up` points up, to ones with +Y up, in meters.
+
+    With +Z up −Y is the front, as in CAD; with +X up +Z is. Raises UsageError for other axes and units.
+    """
+    for name, given, known in (("up", up, get_args(Axis)), ("unit", unit, METERS)):
+        if given not in known:
+            raise UsageError(f"{name} is {given!r}; give one of {', '.join(known)}")
+    turn = np.eye(4)
+    if up == "z":
+        turn[1:3, 1:3] = [[0, 1], [-1, 0]]
+    elif up == "x":
+        turn[:2, :2] = [[0, -1], [1, 0]]
+    meters = METERS[unit]
+    return turn @ scaling((meters, meters, meters))
