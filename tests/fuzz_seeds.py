@@ -13,8 +13,6 @@ from clrt.output.images import write_image
 
 from .formats.glb import Gltf, ball
 from .formats.test_gltf import cameras, compressed
-from .formats.test_gltf_animations import animated
-from .formats.test_gltf_skins import Skinned
 from .formats.test_meshes import (
     obj,
     obj_with_normals,
@@ -136,8 +134,6 @@ def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
         "b.gltf": ball(),
         "cameras.gltf": cameras(),
         "draco.glb": compressed(),
-        "animated.gltf": animated(),
-        "skinned.gltf": Skinned(2, "<u1").gltf,
         "textured.glb": textured((folder / "wood.jpg").read_bytes()),
     }.items():
         document.write(folder / name)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..device.launches.data_parallel import DataParallel
-from ..device.launches.device_arrays import empty_array, on_device
+from ..device.launches.device_arrays import empty_array, on_device, on_host
 from ..device.open import Device
 from ..device.programs.preamble import defines, typedefs
 from ..device.programs.program import compose
@@ -68,6 +69,23 @@ class Refitter:
                 *self._tree,
             )
             end = first
+
+
+def relative_area(device: Device, tree: Layout) -> float:
+    """Return the sum of the areas of all boxes of a BVH that can be refitted, relative to the root's: about the number
+    of boxes that a ray hits. It grows as a refit moves neighbors apart."""
+    nodes = on_host(device, tree.buffers["nodes"])
+    low, high = ("lo", "hi") if tree.name == "bvh8" else ("aabb_min", "aabb_max")
+    boxes = [nodes[name].reshape(len(nodes), 3, -1).astype(np.float64) for name in (low, high)]
+    first = [boxes[0][0].min(axis=1), boxes[1][0].max(axis=1)]
+    root = _area(*(end[None, :, None] for end in first))
+    return _area(*boxes) / root if root > 0 else 1.0
+
+
+def _area(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
+    """Return half the summed area of boxes (n, 3, k); inverted ones, of unused slots, have none."""
+    x, y, z = np.maximum(high - low, 0).transpose(1, 0, 2)
+    return float(np.sum(x * y + y * z + z * x))
 
 
 def program_source(layout: str) -> str:

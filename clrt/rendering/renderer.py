@@ -132,7 +132,8 @@ class Renderer:
         """Start a new image of another scene with the same settings, like `look` if only the camera differs.
 
         BVHs, buffers and the program are reused as far as they are the same. If only vertices moved, the BVH is
-        refitted where its layout allows it. Raises SceneError if the scene is invalid, and UsageError as `look` does.
+        refitted where its layout allows it, unless they moved far apart. Raises SceneError if the scene is invalid, and
+        UsageError as `look` does.
         """
         check_of_none(self._checkpoints)
         check_is_scene(scene)

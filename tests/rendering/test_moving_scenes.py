@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
-from clrt.accel.refit import can_refit
+from clrt.accel.refit import can_refit, relative_area
 from clrt.device.open import Device
 
 from ..scene.shapes import icosphere
@@ -54,6 +54,23 @@ def test_moved_scenes_give_the_images_of_new_renderers(device: Device) -> None:
     assert trees[0] is trees[1] is trees[2] and trees[3] is not trees[0] and trees[4] is not trees[0]
     renderer.show(scene(0))
     np.testing.assert_array_equal(image(renderer), first)
+
+
+def test_what_moves_far_apart_gets_a_new_bvh(device: Device) -> None:
+    """Triangles that swap their places enlarge the boxes of a refitted BVH."""
+    rng = np.random.default_rng(4)
+    places, faces = rng.uniform(-1, 1, (300, 1, 3)), np.arange(900, dtype=np.int32).reshape(-1, 3)
+    trees = []
+    renderer = None
+    for moved in (places, places + 0.1 * places**2, rng.permutation(places)):
+        mesh = clrt.Mesh((moved + 0.05 * np.eye(3)).reshape(-1, 3).astype(np.float32), faces)
+        content = clrt.Scene(meshes=[mesh], camera=CAMERA, environment=SKY)
+        renderer = renderer or begun(device, scene(0))
+        renderer.show(content)
+        trees.append(renderer.compiled.tree)
+        np.testing.assert_array_equal(image(renderer), image(begun(device, content)))
+    assert trees[1].buffers["nodes"] is not trees[2].buffers["nodes"]
+    assert relative_area(device, trees[2]) < 1.5 * relative_area(device, trees[0])
 
 
 def test_scenes_that_are_wrong(device: Device) -> None:

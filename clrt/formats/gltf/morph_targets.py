@@ -1,4 +1,4 @@
-"""Morph targets of a glTF primitive, applied with the file's static weights (specification 3.7.2.2)."""
+"""Morph targets of a glTF primitive, applied with given weights (specification 3.7.2.2)."""
 
 from __future__ import annotations
 

@@ -77,7 +77,8 @@ class ReuseCache:
         return last
 
     def _refitted(self, device: Device | None, last: Layout | None, meshes: list[Mesh]) -> Layout | None:
-        """Return the last BVH, refitted to the meshes' moved vertices; None if its layout does not allow it."""
+        """Return the last BVH, refitted to the meshes' moved vertices; None if a new one is better, or its layout does
+        not allow it."""
         if device is None or last is None or not can_refit(last):
             return None
         self._moved = self._moved or MovedTree(device, last, meshes)
