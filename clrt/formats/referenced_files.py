@@ -65,7 +65,7 @@ def find_file(referrer: Path, folders: Iterable[Path], name: str) -> Path | None
         if found := next((file for file in candidates if file.is_file()), None):
             return found
         for file in candidates:
-            if (found := _any_case(file)) is not None:
+            if (found := _any_case(file)) is not None and found.is_file():
                 log.warning("%s: no file %s; using %s", referrer, printable(name), printable(found.name))
                 return found
     except OSError:  # such as a name that is too long
@@ -73,9 +73,9 @@ def find_file(referrer: Path, folders: Iterable[Path], name: str) -> Path | None
     return None
 
 
-def _any_case(file: Path) -> Path | None:
-    """Return the file in the same folder whose name differs in letter case only; the first of several."""
-    if not file.parent.is_dir():
+def _any_case(path: Path) -> Path | None:
+    """Return the file or folder whose path differs in letter case only; the first of several."""
+    folder = path.parent if path.parent.is_dir() else _any_case(path.parent)
+    if folder is None or not folder.is_dir():
         return None
-    same = (each for each in sorted(file.parent.iterdir()) if each.name.lower() == file.name.lower())
-    return next(filter(Path.is_file, same), None)
+    return next((each for each in sorted(folder.iterdir()) if each.name.lower() == path.name.lower()), None)

@@ -99,11 +99,11 @@ def _valid_faces(path: Path, blocks: list[Block], tables: Tables) -> tuple[Corne
     for column, table in ((1, tables.uv), (2, tables.normals)):
         if not len(table):  # exporters may leave them out, but not the indices
             corners.indices[:, column] = 0
-    wrong = (corners.indices < [1, 0, 0]) | (corners.indices > [len(table) for table in tables[:3]])
+    wrong = (corners.indices < [1, 0, 0]) | (corners.indices > counts.sum(axis=0))
     faults, bad = [block.fault for block in blocks if block.fault], np.zeros(len(corners.sizes), np.bool_)
     if wrong.any():
         corner, column = np.argwhere(wrong)[0]
-        faults.append(_range_fault(int(column), int(corners.indices[corner, column]), len(tables[column])))
+        faults.append(_range_fault(int(column), int(corners.indices[corner, column]), int(counts[:, column].sum())))
         bad = np.logical_or.reduceat(wrong.any(axis=1), np.cumsum(corners.sizes) - corners.sizes)
     if faults:
         count = sum(block.bad_faces for block in blocks) + int(bad.sum())
