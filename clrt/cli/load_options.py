@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from ..formats.up_axis import METERS, Unit
-from ..scene.model import Axis
+from ..scene.axes import Axis, Unit
 from .option_groups import flag
 from .option_types import OneOf
 
@@ -31,7 +30,7 @@ class LoadOptions:
         help="Axis of a bare model that points up. Default: what the file says, or z for .stl, y for others.",
     )
     unit: Unit | None = flag(
-        "--unit", type=OneOf(list(METERS)), help="Unit of a bare model's coordinates, to convert them to meters."
+        "--unit", type=OneOf(get_args(Unit)), help="Unit of a bare model's coordinates, to convert them to meters."
     )
 
     def load(self, path: Path) -> Scene:

@@ -88,7 +88,7 @@ def polygon_files(draw: st.DrawFn) -> tuple[bytes, np.ndarray, list[list[int]]]:
     for size in draw(st.lists(st.integers(3, 7), min_size=1, max_size=12)):
         angles = np.sort(random.random(size)) * 2 * np.pi
         faces.append(list(range(len(points), len(points) + size)))
-        points += np.column_stack([np.cos(angles), np.sin(angles), np.full(size, len(faces))]).round(3).tolist()
+        points += np.column_stack([np.cos(angles), np.sin(angles), np.full(size, len(faces))]).tolist()
     place = draw(st.sampled_from(["float", "double"]))
     count, index = draw(st.sampled_from(["uchar", "int", "ushort"])), draw(st.sampled_from(["int", "uint", "ushort"]))
     label = draw(st.booleans())
