@@ -213,14 +213,17 @@ def test_textures(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
 def test_colors_of_every_type(kind: str, white: float, encoding: str, tmp_path: Path) -> None:
     """Of vertices and of faces; white is the greatest value of unsigned types, and 1 for floats."""
     properties = [f"{kind} {name}" for name in ("red", "green", "blue")]
-    rows = (np.eye(3) * white).astype(type(white)).tolist()
+    fifth = linear_from_srgb(np.full(1, 0.2, np.float32))[0]
+    rows = (np.eye(3) * white + (np.eye(3)[[1, 2, 0]] * (white / 5))).astype(type(white)).tolist()
+    expected = np.eye(3) + np.eye(3)[[1, 2, 0]] * fifth
     vertices = ("vertex", [*XYZ, *properties], [(*p, *row) for p, row in zip(SQUARE, rows)])
     mesh = read(tmp_path / "a.ply", written([vertices, ("face", CORNERS, [([0, 1, 2],)])], encoding))
-    np.testing.assert_array_equal(mesh.colors, np.eye(3))
+    assert mesh.colors is not None
+    np.testing.assert_allclose(mesh.colors, expected, atol=1e-6)
     faces = ("face", [*CORNERS, *properties], [([0, 1, 2, 3], *rows[0]), ([0, 1, 2], *rows[2])])
     mesh = read(tmp_path / "b.ply", written([("vertex", XYZ, SQUARE), faces], encoding))
     assert mesh.colors is not None
-    np.testing.assert_array_equal(mesh.colors[mesh.faces][:, 0], np.eye(3)[[0, 0, 2]])
+    np.testing.assert_allclose(mesh.colors[mesh.faces][:, 0], expected[[0, 0, 2]], atol=1e-6)
 
 
 @pytest.mark.parametrize("alphas, kept", [((255, 51, 0), True), ((255, 255, 255), False), ((0, 0, 0), False)])
