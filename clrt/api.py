@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from .file_names import StrPath
 from .float_errors import with_default_errors
 from .formats.load_scene import load as _load
-from .formats.model_choice import LightUnit, ModelChoice
-from .formats.up_axis import Unit
+from .formats.model_choice import ModelChoice
 from .output.data_images import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
@@ -21,8 +20,9 @@ from .rendering.render_report import render_report
 from .rendering.renderer import Renderer
 from .rendering.renderer_options import SETTINGS, RendererOptions
 from .rendering.stop_conditions import planned_spp
+from .scene.axes_and_units import Axis, Unit
 from .scene.camera_path import frames as _frames
-from .scene.model import Axis, Scene
+from .scene.model import Scene
 
 
 @with_default_errors

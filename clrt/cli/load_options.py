@@ -6,9 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from ..formats.model_choice import LightUnit, ModelChoice
-from ..formats.up_axis import METERS, Unit
-from ..scene.model import Axis
+from ..scene.axes_and_units import Axis, LightUnit, Unit
 from .option_groups import flag
 from .option_types import Finite, OneOf
 
@@ -32,7 +30,7 @@ class LoadOptions:
         help="Axis of a bare model that points up. Default: what the file says, or z for .stl, y for others.",
     )
     unit: Unit | None = flag(
-        "--unit", type=OneOf(list(METERS)), help="Unit of a bare model's coordinates, to convert them to meters."
+        "--unit", type=OneOf(get_args(Unit)), help="Unit of a bare model's coordinates, to convert them to meters."
     )
 
     model_scene: str | None = flag(
@@ -62,6 +60,7 @@ class LoadOptions:
     def load(self, path: Path, moving: bool = False) -> Scene:
         """Load the scene or model. moving: whether its animation is rendered. Raises SceneError."""
         from ..formats.load_scene import load
+        from ..formats.model_choice import ModelChoice
 
         choice = ModelChoice(
             scene=self.model_scene,

@@ -11,9 +11,10 @@ from pathlib import Path
 
 from ..errors import SceneError, UsageError
 from ..file_names import StrPath
+from ..scene.axes_and_units import Axis, Unit
 from ..scene.default_sky import SUN, default_sky
 from ..scene.geometry.transform import rotation, transform_light
-from ..scene.model import Axis, Instance, Mesh, Model, Scene
+from ..scene.model import Instance, Mesh, Model, Scene
 from ..scene.provenance import source_of_model
 from ..scene.validation.validate import scene_problems
 from .frame_model import VIEWS, frame
@@ -23,7 +24,7 @@ from .referenced_files import check_file, name_of
 from .toml.instance_table import placed_animation
 from .toml.mesh_table import MeshTable
 from .toml.reader import SceneReader, camera_problems
-from .up_axis import Unit, upright
+from .up_axis import upright
 
 log = logging.getLogger(__name__)
 #: Stands for a TOML scene on standard input; its file names are relative to the working directory.

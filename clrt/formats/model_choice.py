@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from math import isfinite
-from typing import Literal, get_args
+from typing import get_args
 
 from ..errors import SceneError, UsageError
+from ..scene.axes_and_units import LightUnit
 from ..scene.validation.field_types import show
 
 Named = str | int
-LightUnit = Literal["photometric", "radiometric", "blender"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 
 from ..errors import UsageError
+from ..scene.axes_and_units import METERS, Axis, Unit
 from ..scene.geometry.transform import Matrix, scaling
-from ..scene.model import Axis
-
-Unit = Literal["m", "cm", "mm", "in", "ft"]
-METERS: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 
 def upright(up: Axis, unit: Unit = "m") -> Matrix:

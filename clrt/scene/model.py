@@ -6,13 +6,14 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ClrtError
 from .animation import Animation, ModelAnimation
+from .axes_and_units import Axis
 from .cameras import Camera as Camera
 from .fields.limits import Gt
 from .fields.number_arrays import real_array, whole_array
@@ -23,7 +24,6 @@ from .materials.textures import NonNegative
 from .render_settings import RenderSettings as RenderSettings
 
 Vector = tuple[float, float, float]
-Axis = Literal["x", "y", "z"]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]

@@ -88,7 +88,7 @@ def polygon_files(draw: st.DrawFn) -> tuple[bytes, np.ndarray, list[list[int]]]:
     for size in draw(st.lists(st.integers(3, 7), min_size=1, max_size=12)):
         angles = np.sort(random.random(size)) * 2 * np.pi
         faces.append(list(range(len(points), len(points) + size)))
-        points += np.column_stack([np.cos(angles), np.sin(angles), np.full(size, len(faces))]).round(3).tolist()
+        points += np.column_stack([np.cos(angles), np.sin(angles), np.full(size, len(faces))]).tolist()
     place = draw(st.sampled_from(["float", "double"]))
     count, index = draw(st.sampled_from(["uchar", "int", "ushort"])), draw(st.sampled_from(["int", "uint", "ushort"]))
     label = draw(st.booleans())
@@ -213,14 +213,17 @@ def test_textures(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
 def test_colors_of_every_type(kind: str, white: float, encoding: str, tmp_path: Path) -> None:
     """Of vertices and of faces; white is the greatest value of unsigned types, and 1 for floats."""
     properties = [f"{kind} {name}" for name in ("red", "green", "blue")]
-    rows = (np.eye(3) * white).astype(type(white)).tolist()
+    fifth = linear_from_srgb(np.full(1, 0.2, np.float32))[0]
+    rows = (np.eye(3) * white + (np.eye(3)[[1, 2, 0]] * (white / 5))).astype(type(white)).tolist()
+    expected = np.eye(3) + np.eye(3)[[1, 2, 0]] * fifth
     vertices = ("vertex", [*XYZ, *properties], [(*p, *row) for p, row in zip(SQUARE, rows)])
     mesh = read(tmp_path / "a.ply", written([vertices, ("face", CORNERS, [([0, 1, 2],)])], encoding))
-    np.testing.assert_array_equal(mesh.colors, np.eye(3))
+    assert mesh.colors is not None
+    np.testing.assert_allclose(mesh.colors, expected, atol=1e-6)
     faces = ("face", [*CORNERS, *properties], [([0, 1, 2, 3], *rows[0]), ([0, 1, 2], *rows[2])])
     mesh = read(tmp_path / "b.ply", written([("vertex", XYZ, SQUARE), faces], encoding))
     assert mesh.colors is not None
-    np.testing.assert_array_equal(mesh.colors[mesh.faces][:, 0], np.eye(3)[[0, 0, 2]])
+    np.testing.assert_allclose(mesh.colors[mesh.faces][:, 0], expected[[0, 0, 2]], atol=1e-6)
 
 
 @pytest.mark.parametrize("alphas, kept", [((255, 51, 0), True), ((255, 255, 255), False), ((0, 0, 0), False)])

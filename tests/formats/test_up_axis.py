@@ -13,7 +13,7 @@ from clrt.cli.convert import command as convert
 from clrt.errors import SceneError, UsageError
 from clrt.formats.load_scene import load
 from clrt.formats.up_axis import upright
-from clrt.scene.model import Axis
+from clrt.scene.axes_and_units import Axis
 
 from .glb import Gltf
 from .test_gltf import cameras

@@ -16,8 +16,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scene.axes_and_units import LightUnit
 from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight, Vector
-from ..model_choice import LightUnit
 
 #: Luminous efficacy in lm/W of light of 555 nm, which defines the candela. Blender converts white light by it, too.
 EFFICACY = 683.0

@@ -10,17 +10,18 @@ from typing import Annotated
 import numpy as np
 
 from ...errors import SceneError
+from ...scene.axes_and_units import Axis, Unit
 from ...scene.fields.limits import Ge, Le, Lt
 from ...scene.geometry.creases import creased
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals, choose_normals
 from ...scene.geometry.transform import Matrix
 from ...scene.materials.material_types import Diffuse
-from ...scene.model import Axis, Instance, Mesh, Model, Vector
+from ...scene.model import Instance, Mesh, Model, Vector
 from ...scene.validation.validate import mesh_problems
-from ..model_choice import DEFAULT, LightUnit, ModelChoice
+from ..model_choice import DEFAULT, ModelChoice
 from ..models import read_model
-from ..up_axis import Unit, upright
+from ..up_axis import upright
 from .placement import Transform
 
 Vertex = Annotated[int, Ge(0), Lt(2**31)]
