@@ -20,7 +20,7 @@ from .rendering.render_report import render_report
 from .rendering.renderer import Renderer
 from .rendering.renderer_options import SETTINGS, RendererOptions
 from .rendering.stop_conditions import planned_spp
-from .scene.axes_and_units import Axis, Unit
+from .scene.axes_and_units import Axis, LightUnit, Unit
 from .scene.camera_path import frames as _frames
 from .scene.model import Scene
 

@@ -6,6 +6,7 @@ The format: Geomview's manual, "OFF Files". Each vertex and each face is on a li
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,16 +16,21 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..file_names import printable
 from ..scene.validation.validate import index_problems
-from .decimal_text import numbers_in
+from ..threads import in_parallel
+from .plain_text import plain_text
 from .ply.elements import Lists
-from .ply.triangles import Fans
+from .ply.triangles import Triangles
+from .polygons import ranges
 from .referenced_files import name_of
 from .seams import with_corner_attributes
+from .text_numbers import floats, padded, per_line, reuse_memory
 
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int64]
-_COMMENT = re.compile(rb"#[^\r\n]*")
+_COMMENT = re.compile(rb"#[^\n]*")
 _KEYWORD = re.compile(rb"\s*(ST)?(C)?(N)?(4)?(n)?(?:OFF|off)(?=\s|\d)[ \t]*(BINARY)?")
+#: Bytes that are parsed at a time.
+BLOCK = 1 << 20
 #: Encoded value of the default material's color, for faces without a color beside others.
 PLAIN = 0.9063
 
@@ -42,7 +48,7 @@ def parse_off(path: Path) -> dict[str, Any]:
 
     Raises SceneError for malformed files and unsupported variants.
     """
-    text = path.read_bytes()
+    text = plain_text(path.read_bytes())
     text = _COMMENT.sub(b"", text) if b"#" in text else text
     keyword = _KEYWORD.match(text)
     if keyword is None and not re.match(rb"\s*\d", text):
@@ -68,15 +74,28 @@ def _malformed(fault: str) -> SceneError:
 
 
 def _lines(text: bytes) -> Lines:
-    """Parse the numbers of a text. Raises SceneError for other words."""
-    try:
-        numbers = numbers_in(text)
-    except ValueError:
-        raise _malformed("contains words that are not numbers") from None
-    letters = np.frombuffer(text.replace(b"\r\n", b"\n").replace(b"\r", b"\n") + b"\n", np.uint8)
-    blank = letters <= ord(" ")
-    starts = np.flatnonzero(~blank & np.append(True, blank[:-1]))
-    counts = np.diff(np.searchsorted(starts, np.flatnonzero(letters == ord("\n"))), prepend=0)
+    """Parse the numbers of a text, blocks of lines in parallel. Raises SceneError for other words."""
+    reuse_memory()
+    parsed = in_parallel(lambda limits: _block(text[slice(*limits)]), _blocks(text))
+    return Lines(np.concatenate([each.numbers for each in parsed]), np.concatenate([each.counts for each in parsed]))
+
+
+def _blocks(text: bytes) -> Iterator[tuple[int, int]]:
+    """Yield the start and the stop of blocks of whole lines, at least one."""
+    start = 0
+    while start == 0 or start < len(text):
+        stop = text.find(b"\n", start + BLOCK) + 1 or max(len(text), 1)
+        yield start, stop
+        start = stop
+
+
+def _block(text: bytes) -> Lines:
+    letters = padded(text)
+    numbers, starts, malformed = floats(letters)
+    if malformed.size:
+        word = printable(letters[starts[malformed[0]] :].tobytes().split()[0][:60].decode("utf-8", "replace"))
+        raise _malformed(f'has "{word}" in place of a number')
+    counts = per_line(letters, starts)
     return Lines(numbers, counts[counts > 0])
 
 
@@ -106,18 +125,17 @@ def _with_faces(whole: dict[str, Any], lines: Lines, name: str) -> dict[str, Any
     extra = lines.counts - 1 - sizes
     if np.any(sizes < 0) or np.any(extra < 0):
         raise _malformed("has a face with fewer values than it counts")
-    within = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    corners = lines.numbers[np.repeat(starts + 1, sizes) + within].astype(np.int64)
-    fans = Fans(Lists(sizes, corners))
-    if problems := index_problems(fans.vertices, len(whole["vertices"]), f'mesh "{name}"'):
+    corners = lines.numbers[ranges(starts + 1, sizes)].astype(np.int64)
+    triangles = Triangles(Lists(sizes, corners), whole["vertices"])
+    if problems := index_problems(triangles.vertices, len(whole["vertices"]), f'mesh "{name}"'):
         raise SceneError(problems)
-    whole = {**whole, "faces": fans.vertices}
+    whole = {**whole, "faces": triangles.vertices}
     colored = extra >= 3
     if whole["vertex_colors"] is not None or not colored.any():
         return whole
     colors = np.full((len(sizes), 3), PLAIN)
     colors[colored] = _unit(lines.numbers[(starts + 1 + sizes)[colored, None] + np.arange(3)])
-    return with_corner_attributes(whole, {"vertex_colors": np.repeat(colors[fans.polygons], 3, axis=0)})
+    return with_corner_attributes(whole, {"vertex_colors": np.repeat(colors[triangles.polygons], 3, axis=0)})
 
 
 def _unit(colors: Doubles) -> Doubles:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -303,30 +302,3 @@ def test_off(name: str, tmp_path: Path) -> None:
     if name == "CNOFF":
         assert mesh.normals is not None
         np.testing.assert_allclose(mesh.normals, [[0, 0, 1]] * 3)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda text: text.replace("OFF", "OFF BINARY"), 'is of the kind "OFF BINARY"'),
-        (lambda text: text.replace("OFF", "4OFF"), 'is of the kind "4OFF"'),
-        (lambda text: text.replace("OFF", "PLY"), "does not start with OFF"),
-        (lambda text: text.replace("3 1 0", "9" * 30 + " 1 0"), "lines"),
-        (lambda text: text.replace("3 0 1 2", "3 0 1"), "faces[0] has 2 numbers for 3 corners"),
-        (lambda text: text.replace("3 0 1 2", "3 0 1 3"), "faces[0] uses vertex 3, but valid indices are 0 to 2"),
-        (lambda text: text.replace("3 0 1 2", "nan 0 1 2"), "faces[0] has 3 numbers"),
-        (lambda text: text.replace("1 0 0", "1 0"), "a vertex has 2 numbers instead of 3"),
-        (lambda text: text.replace("1 0 0", "1 0 zero"), 'has "zero" in place of a number'),
-        (lambda text: text[:16], "has 1 lines of 3 vertices and 1 faces"),
-    ],
-)
-def test_malformed_off(change: Callable[[str], str], message: str, tmp_path: Path) -> None:
-    (tmp_path / "a.off").write_text(change(OFF["OFF"]))
-    with pytest.raises(SceneError) as caught:
-        read_mesh(tmp_path / "a.off")
-    assert message in str(caught.value)
-
-
-def test_colors_of_off_faces_are_ignored_with_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    assert corners(tmp_path / "a.off", OFF["OFF"].replace("3 0 1 2", "3 0 1 2 255 0 0")) == [FACE]
-    assert caplog.messages == [f"{tmp_path / 'a.off'}: ignored: the colors of faces"]

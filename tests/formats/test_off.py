@@ -96,7 +96,7 @@ WRONG = {
     "no counts": ("OFF\n", "has no line with its numbers"),
     "short": ("OFF\n4 2 0\n" + rows(SQUARE) + "3 0 1 2\n", "counts 4 vertices and 2 faces, but has 5 lines"),
     "huge": ("OFF\n1e300 99999999999999 0\n0 0 0\n", "lines of them"),
-    "not a number": ("OFF\n4 2 0\n" + rows(SQUARE).replace("1", "one") + FACES, "contains words that are not numbers"),
+    "not a number": ("OFF\n4 2 0\n" + rows(SQUARE).replace("1", "one") + FACES, 'has "one" in place of a number'),
     "ragged": ("OFF\n4 1 0\n0 0\n" + rows(SQUARE[1:]) + "3 0 1 2\n", "different numbers of values"),
     "few": ("COFF\n4 2 0\n" + rows(SQUARE) + FACES, "vertices of 3 values, fewer than its first line names"),
     "face": ("OFF\n4 1 0\n" + rows(SQUARE) + "4 0 1 2\n", "a face with fewer values than it counts"),

@@ -18,7 +18,7 @@ from ...scene.validation.validate import index_problems
 from ..models import read_model
 from ..ply.attributes import columns_of, coordinates_of
 from ..ply.elements import Columns, read_elements
-from ..ply.triangles import Fans, faces_of
+from ..ply.triangles import Triangles, faces_of
 from .materials import MaterialReader, ShapeMaterial, absorbing
 from .primitives import cube, cylinder, disk, rectangle, sphere
 from .textures import Attribute, TextureReader
@@ -209,14 +209,14 @@ def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
     points = None if vertex is None else columns_of(vertex, ("x", "y", "z"))
     if vertex is None or found is None or points is None:
         return None
-    face, fans = found[0], Fans(found[1])
-    if problems := index_problems(fans.vertices, vertex.number, f'mesh "{path.stem}"'):
+    face, triangles = found[0], Triangles(found[1], points)
+    if problems := index_problems(triangles.vertices, vertex.number, f'mesh "{path.stem}"'):
         raise SceneError([f"{path}: {problem}" for problem in problems])
-    mesh = Mesh(points, fans.vertices, name=path.stem)
+    mesh = Mesh(points, triangles.vertices, name=path.stem)
     normals, uv = columns_of(vertex, ("nx", "ny", "nz")), coordinates_of(vertex)
     mesh.normals = None if normals is None else normals.astype(np.float32)
     mesh.uv = None if uv is None else uv.astype(np.float32)
-    of_faces = {name: values[fans.polygons] for name, values in _attributes(face).items()}
+    of_faces = {name: values[triangles.polygons] for name, values in _attributes(face).items()}
     attributes = {f"vertex_{name}": values for name, values in _attributes(vertex).items()}
     return mesh, attributes | {f"face_{name}": values for name, values in of_faces.items()}
 

@@ -20,7 +20,7 @@ from ..seams import with_corner_attributes
 from .attributes import Array, colors_of, columns_of, coordinates_of, corner_coordinates
 from .elements import Columns, Lists, read_elements
 from .points import point_spheres
-from .triangles import Fans, faces_of, strip_triangles
+from .triangles import Triangles, faces_of, strip_triangles
 
 log = logging.getLogger(__name__)
 
@@ -42,8 +42,8 @@ def parse_ply(path: Path) -> dict[str, Any]:
     if sum(columns.number for columns in elements.values()) == vertex.number:
         return point_spheres(points, vertex.scalars.get("radius"), colors_of(vertex)) | {"up": up}
     found = faces_of(elements)
-    fans = None if found is None else Fans(found[1])
-    faces = strip_triangles(elements) if fans is None else fans.vertices
+    triangles = None if found is None else Triangles(found[1], points)
+    faces = strip_triangles(elements) if triangles is None else triangles.vertices
     if problems := index_problems(faces, vertex.number, f'mesh "{name_of(path)}"'):
         raise SceneError(problems)
     whole = {
@@ -54,10 +54,10 @@ def parse_ply(path: Path) -> dict[str, Any]:
         "vertex_colors": colors_of(vertex),
     }
     textures = np.zeros(len(faces), np.int64)
-    if found is not None and fans is not None:
-        whole = with_corner_attributes(whole, _of_corners(*found, fans, whole["vertex_colors"] is None))
+    if found is not None and triangles is not None:
+        whole = with_corner_attributes(whole, _of_corners(*found, triangles, whole["vertex_colors"] is None))
         if "texnumber" in found[0].scalars:
-            textures = found[0].scalars["texnumber"].astype(np.int64)[fans.polygons]
+            textures = found[0].scalars["texnumber"].astype(np.int64)[triangles.polygons]
     return {"geometry": _by_texture(path, header.comments, whole, textures), "up": up}
 
 
@@ -72,13 +72,13 @@ def _finite_where_unused(points: Array, faces: Array) -> Array:
     return points
 
 
-def _of_corners(face: Columns, polygons: Lists, fans: Fans, with_colors: bool) -> dict[str, Array]:
+def _of_corners(face: Columns, polygons: Lists, triangles: Triangles, with_colors: bool) -> dict[str, Array]:
     """Return the texture coordinates and colors that faces have, by corner of the triangles."""
     of_corners: dict[str, Array] = {}
     if (uv := corner_coordinates(face, polygons)) is not None:
-        of_corners["uv"] = uv[fans.corners.ravel()]
+        of_corners["uv"] = uv[triangles.corners.ravel()]
     if with_colors and (colors := colors_of(face)) is not None:
-        of_corners["vertex_colors"] = np.repeat(colors[fans.polygons], 3, axis=0)
+        of_corners["vertex_colors"] = np.repeat(colors[triangles.polygons], 3, axis=0)
     return of_corners
 
 

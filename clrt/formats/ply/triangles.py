@@ -1,4 +1,4 @@
-"""Triangles of a PLY file's polygons and triangle strips."""
+"""Triangles of a file's polygons and triangle strips."""
 
 from __future__ import annotations
 
@@ -10,40 +10,46 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..polygons import fans, ranges, triangulate
 from .elements import Columns, Lists
 
 log = logging.getLogger(__name__)
 Ints = NDArray[np.int64]
 
 
-class Fans:
-    """Triangles of polygons with any number of corners, whose vertices are `polygons`."""
+class Triangles:
+    """Triangles of polygons with any number of corners. polygons: their vertices, indices into `points` (n, 3)."""
 
-    def __init__(self, polygons: Lists) -> None:
-        self._polygons = polygons
+    def __init__(self, polygons: Lists, points: NDArray[np.floating]) -> None:
+        self._polygons, self._points = polygons, points
         self._all_triangles = len(polygons.items) == 3 * len(polygons.counts) and bool(np.all(polygons.counts == 3))
 
     @cached_property
     def vertices(self) -> NDArray[Any]:
-        """(m, 3), of any integer dtype: the vertices of each triangle."""
+        """(m, 3), of any integer dtype: the vertices of each triangle, which may be out of range."""
+        return self._items.reshape(-1, 3) if self._all_triangles else self._items[self.corners]
+
+    @property
+    def _items(self) -> NDArray[Any]:
         items = self._polygons.items
-        items = items if np.issubdtype(items.dtype, np.integer) else items.astype(np.int64)
-        return items.reshape(-1, 3) if self._all_triangles else items[self.corners]
+        return items if np.issubdtype(items.dtype, np.integer) else items.astype(np.int64)
 
     @cached_property
     def corners(self) -> Ints:
         """(m, 3): their numbers among the corners of all polygons."""
-        counts = self._polygons.counts.astype(np.int64)
-        step = np.arange(len(self.polygons)) - np.searchsorted(self.polygons, self.polygons)
-        first = (np.cumsum(counts) - counts)[self.polygons]
-        return np.stack([first, first + step + 1, first + step + 2], axis=1)
+        counts, items = self._polygons.counts.astype(np.int64), self._items
+        used = counts >= 3
+        if not used.all():
+            log.warning("%d faces with fewer than 3 corners are ignored", np.sum(~used))
+        places = ranges((np.cumsum(counts) - counts)[used], counts[used])
+        if len(items) and (items.min() < 0 or items.max() >= len(self._points)):
+            return places[fans(counts[used])]
+        return places[triangulate(np.asarray(self._points, np.float64), items[places], counts[used])]
 
     @cached_property
     def polygons(self) -> Ints:
         """(m,): which polygon each triangle is part of; none for those with fewer than three corners."""
         counts = self._polygons.counts.astype(np.int64)
-        if ignored := int((counts < 3).sum()):
-            log.warning("%d faces with fewer than 3 corners are ignored", ignored)
         return np.repeat(np.arange(len(counts)), np.maximum(counts - 2, 0))
 
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 
 from ...errors import SceneError
-from ...scene.axes_and_units import Axis, Unit
+from ...scene.axes_and_units import Axis, LightUnit, Unit
 from ...scene.fields.limits import Ge, Le, Lt
 from ...scene.geometry.creases import creased
 from ...scene.geometry.instancing import meshes_by_id
