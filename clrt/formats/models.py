@@ -23,10 +23,9 @@ from ..scene.geometry.normals import Normals, choose_normals
 from ..scene.materials.material import BELOW_ONE
 from ..scene.materials.material_types import Diffuse
 from ..scene.model import Mesh, Model
-from ..scene.validation.validate import index_problems, mesh_problems
+from ..scene.validation.validate import mesh_problems
 from .images.image_reader import linear_from_srgb
 from .model_choice import DEFAULT, ModelChoice
-from .polygons import triangulate
 from .referenced_files import check_file, name_of
 
 log = logging.getLogger(__name__)
@@ -158,7 +157,6 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
             uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
         faces = np.asarray(piece["faces"])
         faces = faces if np.issubdtype(faces.dtype, np.integer) else faces.astype(np.int64)
-        faces = _triangles(vertices, faces, name)
     except (TypeError, ValueError):
         raise SceneError(f'mesh "{name}": its lines have different numbers of values; export it again') from None
     colors = _linear_colors(piece.get("vertex_colors"))
@@ -201,18 +199,6 @@ def _linear_colors(colors: Any) -> NDArray[np.float32] | None:
     linear = linear_from_srgb(encoded[:, :3])
     alpha = encoded[:, 3:4]
     return np.concatenate([linear, alpha], axis=1) if alpha.any() and (alpha < 1).any() else linear
-
-
-def _triangles(vertices: NDArray[np.float32], polygons: NDArray[Any], name: str) -> NDArray[Any]:
-    """Split polygons of k corners, (m, k), into k − 2 triangles each."""
-    if polygons.ndim != 2 or polygons.shape[1] < 3:
-        raise SceneError(f'mesh "{name}": its faces have fewer than 3 corners; export triangles')
-    if polygons.shape[1] == 3:
-        return polygons
-    if problems := index_problems(polygons, len(vertices), f'mesh "{name}"'):
-        raise SceneError(problems)
-    corners = polygons.ravel()
-    return corners[triangulate(vertices.astype(np.float64), corners, np.full(len(polygons), polygons.shape[1]))]
 
 
 def _size(array: Any) -> int:

@@ -6,7 +6,6 @@ The format: Geomview's manual, "OFF Files". Each vertex and each face is on a li
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,21 +15,18 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..file_names import printable
 from ..scene.validation.validate import index_problems
-from ..threads import in_parallel
 from .plain_text import plain_text
 from .ply.elements import Lists
 from .ply.triangles import Triangles
 from .polygons import ranges
 from .referenced_files import name_of
 from .seams import with_corner_attributes
-from .text_numbers import floats, padded, per_line, reuse_memory
+from .text_numbers import numbers
 
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int64]
 _COMMENT = re.compile(rb"#[^\n]*")
 _KEYWORD = re.compile(rb"\s*(ST)?(C)?(N)?(4)?(n)?(?:OFF|off)(?=\s|\d)[ \t]*(BINARY)?")
-#: Bytes that are parsed at a time.
-BLOCK = 1 << 20
 #: Encoded value of the default material's color, for faces without a color beside others.
 PLAIN = 0.9063
 
@@ -56,7 +52,10 @@ def parse_off(path: Path) -> dict[str, Any]:
     if keyword and (keyword[5] or keyword[6]):
         kind = printable(keyword[0].decode().strip())
         raise SceneError(f'is an OFF file of the kind "{kind}", which is not supported; export it as plain text')
-    lines = _lines(text[keyword.end() :] if keyword else text)
+    values, counts, word = numbers(text[keyword.end() :] if keyword else text)
+    if word:
+        raise _malformed(f'has "{word}" in place of a number')
+    lines = Lines(values, counts)
     if not len(lines.counts) or lines.counts[0] < 2:
         raise _malformed("has no line with its numbers of vertices and faces")
     vertices, faces = lines.numbers[:2].astype(np.int64).tolist()
@@ -71,32 +70,6 @@ def parse_off(path: Path) -> dict[str, Any]:
 
 def _malformed(fault: str) -> SceneError:
     return SceneError(f"cannot be read as OFF: it {fault}; export the model again")
-
-
-def _lines(text: bytes) -> Lines:
-    """Parse the numbers of a text, blocks of lines in parallel. Raises SceneError for other words."""
-    reuse_memory()
-    parsed = in_parallel(lambda limits: _block(text[slice(*limits)]), _blocks(text))
-    return Lines(np.concatenate([each.numbers for each in parsed]), np.concatenate([each.counts for each in parsed]))
-
-
-def _blocks(text: bytes) -> Iterator[tuple[int, int]]:
-    """Yield the start and the stop of blocks of whole lines, at least one."""
-    start = 0
-    while start == 0 or start < len(text):
-        stop = text.find(b"\n", start + BLOCK) + 1 or max(len(text), 1)
-        yield start, stop
-        start = stop
-
-
-def _block(text: bytes) -> Lines:
-    letters = padded(text)
-    numbers, starts, malformed = floats(letters)
-    if malformed.size:
-        word = printable(letters[starts[malformed[0]] :].tobytes().split()[0][:60].decode("utf-8", "replace"))
-        raise _malformed(f'has "{word}" in place of a number')
-    counts = per_line(letters, starts)
-    return Lines(numbers, counts[counts > 0])
 
 
 def _vertices(lines: Lines, keyword: re.Match[bytes] | None) -> dict[str, Any]:

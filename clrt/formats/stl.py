@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from ..file_names import printable
 from ..scene.editing import free_name
-from .decimal_text import numbers_in
+from ..threads import in_parallel
 from .referenced_files import name_of
+from .text_numbers import floats, padded, reuse_memory
 
 log = logging.getLogger(__name__)
 #: Sizes in bytes of a binary file's header with the number of facets, and of a facet: normal, corners, attribute.
@@ -113,18 +114,19 @@ def _solids(text: bytes) -> Iterator[tuple[str, bytes]]:
 
 def _corners(text: bytes) -> NDArray[np.float64]:
     """Return the corners of a solid's triangles, (3m, 3)."""
-    parts = [_regular(chunk) for chunk in _chunks(text)]
-    return np.concatenate(parts) if parts else np.zeros((0, 3))
+    reuse_memory()
+    parts = in_parallel(lambda limits: _regular(text[slice(*limits)]), _chunks(text))
+    return np.concatenate([np.zeros((0, 3)), *parts])
 
 
-def _chunks(text: bytes) -> Iterator[bytes]:
-    """Yield pieces of the text that end after a facet."""
+def _chunks(text: bytes) -> Iterator[tuple[int, int]]:
+    """Yield the start and the stop of pieces of the text that end after a facet."""
     start = 0
     while start < len(text):
         end = text.rfind(b"endfacet", start, start + CHUNK)
         end = text.find(b"endfacet", start) if end < 0 else end
         end = len(text) if end < 0 else end + len(b"endfacet")
-        yield text[start:end]
+        yield start, end
         start = end
 
 
@@ -133,10 +135,10 @@ def _regular(text: bytes) -> NDArray[np.float64]:
     plain = text.replace(b"facet normal", b"%d " % MARK)
     for word in WORDS:
         plain = plain.replace(word, b"")
-    try:
-        numbers = numbers_in(plain).reshape(-1, 13)
-    except ValueError:
+    values, _, malformed = floats(padded(plain))
+    if malformed.size or len(values) % 13:
         return _irregular(text)
+    numbers = values.reshape(-1, 13)
     return numbers[:, 4:].reshape(-1, 3) if np.all(numbers[:, 0] == MARK) else _irregular(text)
 
 

@@ -7,9 +7,13 @@ accurately", 1990. Words that are not plain decimals are left to Python.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..threads import in_parallel
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
@@ -20,6 +24,8 @@ Flags = NDArray[np.bool_]
 DIGITS, MARGIN = 19, 24
 #: Integers below this, and powers of ten up to this one, are float64 values, so that one division rounds correctly.
 EXACT_INTEGER, EXACT_POWER = 1 << 53, 22
+#: Bytes that are parsed at a time.
+BLOCK = 1 << 20
 POWERS = np.array([10**power for power in range(DIGITS + 1)], np.uint64)
 #: Steps that join neighboring digits, then pairs and groups of four: the distance in bits, and the bits of the results.
 PAIRS = ((8, 0x00FF00FF00FF00FF), (16, 0x0000FFFF0000FFFF), (32, 0x00000000FFFFFFFF))
@@ -32,6 +38,45 @@ def reuse_memory() -> None:
     """Make the GNU C library keep the memory of freed arrays of up to 30 MiB for later ones, as it does once it has
     freed one of this size. Otherwise page faults take a sixth of the time."""
     np.empty(30 << 20, np.uint8)
+
+
+class TextNumbers(NamedTuple):
+    """Numbers of a text up to the first word that is none; malformed: that word, or empty; counts: how many numbers are
+    on each line that has any."""
+
+    values: Floats
+    counts: Ints
+    malformed: str
+
+
+def numbers(text: bytes) -> TextNumbers:
+    """Parse a text in blocks, by as many threads as there are cores."""
+    reuse_memory()
+    nothing = TextNumbers(np.zeros(0), np.zeros(0, np.int64), "")
+    parsed = [nothing, *in_parallel(lambda limits: _block(text[slice(*limits)]), _blocks(text))]
+    last = next((number for number, block in enumerate(parsed) if block.malformed), len(parsed) - 1)
+    values, counts, words = zip(*parsed[: last + 1])
+    return TextNumbers(np.concatenate(values), np.concatenate(counts), words[-1])
+
+
+def _blocks(text: bytes) -> Iterator[tuple[int, int]]:
+    """Yield the start and the stop of blocks of whole lines."""
+    start = 0
+    while start < len(text):
+        stop = text.find(b"\n", start + BLOCK) + 1 or len(text)
+        yield start, stop
+        start = stop
+
+
+def _block(block: bytes) -> TextNumbers:
+    text = padded(block)
+    values, starts, malformed = floats(text)
+    counts = per_line(text, starts)
+    counts, word = counts[counts > 0], ""
+    if malformed.size:
+        values, place = values[: malformed[0]], int(starts[malformed[0]])
+        word = text[place:].tobytes().split(None, 1)[0][:60].decode("utf-8", "backslashreplace")
+    return TextNumbers(values, counts, word)
 
 
 def padded(text: bytes) -> Bytes:

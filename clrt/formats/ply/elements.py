@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import struct
 from array import array
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -12,17 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ..decimal_text import numbers_in
+from ..text_numbers import numbers
 from .header import Element, Header, Property, parse_header
 
 Array = NDArray[Any]
 #: numpy's types in the notation of `struct`.
 CODES = {"i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f4": "f", "f8": "d"}
-
-_NUMBER = rb"[+-]?(?:\d+\.?\d*(?:e[+-]?\d+)?|\.\d+(?:e[+-]?\d+)?|nan|inf|infinity)(?!\S)"
-_NOT_A_NUMBER = re.compile(rb"(?<!\S)(?!" + _NUMBER + rb")\S", re.IGNORECASE)
-#: What is not a number, as Microsoft's libraries print it.
-_WINDOWS_NAN = re.compile(rb"[+-]?(?:nan\(\w*\)|1\.#\w+)", re.IGNORECASE)
 
 
 class Lists(NamedTuple):
@@ -53,7 +47,7 @@ def read_elements(content: bytes, wanted: Collection[str]) -> tuple[Header, dict
     header = parse_header(content)
     elements, start, order = header.elements, header.size, header.orders[0]
     if not order:  # text is read like a binary file of doubles
-        content, start, order = _numbers(content[start:]), 0, "="
+        content, start, order = numbers(content[start:].replace(b"\r", b"\n")).values.tobytes(), 0, "="
         elements = [each._replace(properties=list(map(_as_double, each.properties))) for each in elements]
     last = max((i for i, element in enumerate(elements) if element.name in wanted), default=-1)
     found = {}
@@ -71,16 +65,6 @@ def read_elements(content: bytes, wanted: Collection[str]) -> tuple[Header, dict
 
 def _as_double(given: Property) -> Property:
     return given._replace(kind="f8", count_kind=given.count_kind and "f8")
-
-
-def _numbers(text: bytes) -> bytes:
-    """Return the doubles that a text consists of, up to its first word that is not a number."""
-    try:
-        return numbers_in(text).tobytes()
-    except ValueError:
-        text = _WINDOWS_NAN.sub(b"nan", text)
-        odd = _NOT_A_NUMBER.search(text)
-        return numbers_in(text[: odd.start()] if odd else text).tobytes()
 
 
 def _records(content: bytes, start: int, element: Element, order: str) -> tuple[Columns, int]:

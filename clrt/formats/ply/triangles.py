@@ -18,39 +18,39 @@ Ints = NDArray[np.int64]
 
 
 class Triangles:
-    """Triangles of polygons with any number of corners. polygons: their vertices, indices into `points` (n, 3)."""
+    """Triangles of polygons with any number of corners, whose vertices are `polygons`, indices into `points` (n, 3)."""
 
-    def __init__(self, polygons: Lists, points: NDArray[np.floating]) -> None:
-        self._polygons, self._points = polygons, points
-        self._all_triangles = len(polygons.items) == 3 * len(polygons.counts) and bool(np.all(polygons.counts == 3))
+    def __init__(self, polygons: Lists, points: NDArray[Any]) -> None:
+        self._points = points
+        self._counts = polygons.counts.astype(np.int64)
+        items = polygons.items
+        self._items = items if np.issubdtype(items.dtype, np.integer) else items.astype(np.int64)
+        self._all_triangles = len(items) == 3 * len(self._counts) and bool(np.all(self._counts == 3))
 
     @cached_property
     def vertices(self) -> NDArray[Any]:
-        """(m, 3), of any integer dtype: the vertices of each triangle, which may be out of range."""
+        """(m, 3), of any integer dtype: the vertices of each triangle."""
         return self._items.reshape(-1, 3) if self._all_triangles else self._items[self.corners]
-
-    @property
-    def _items(self) -> NDArray[Any]:
-        items = self._polygons.items
-        return items if np.issubdtype(items.dtype, np.integer) else items.astype(np.int64)
 
     @cached_property
     def corners(self) -> Ints:
         """(m, 3): their numbers among the corners of all polygons."""
-        counts, items = self._polygons.counts.astype(np.int64), self._items
-        used = counts >= 3
-        if not used.all():
-            log.warning("%d faces with fewer than 3 corners are ignored", np.sum(~used))
-        places = ranges((np.cumsum(counts) - counts)[used], counts[used])
-        if len(items) and (items.min() < 0 or items.max() >= len(self._points)):
-            return places[fans(counts[used])]
-        return places[triangulate(np.asarray(self._points, np.float64), items[places], counts[used])]
+        if self._all_triangles:
+            return np.arange(len(self._items)).reshape(-1, 3)
+        kept = self._counts > 2
+        if ignored := int((~kept).sum()):
+            log.warning("%d faces with fewer than 3 corners are ignored", ignored)
+        sizes = self._counts[kept]
+        corners = ranges((np.cumsum(self._counts) - self._counts)[kept], sizes)
+        items = self._items[corners]
+        if len(items) and 0 <= items.min() and items.max() < len(self._points):
+            return corners[triangulate(self._points.astype(np.float64), items, sizes)]
+        return corners[fans(sizes)]
 
     @cached_property
     def polygons(self) -> Ints:
         """(m,): which polygon each triangle is part of; none for those with fewer than three corners."""
-        counts = self._polygons.counts.astype(np.int64)
-        return np.repeat(np.arange(len(counts)), np.maximum(counts - 2, 0))
+        return np.repeat(np.arange(len(self._counts)), np.maximum(self._counts - 2, 0))
 
 
 def faces_of(elements: Mapping[str, Columns]) -> tuple[Columns, Lists] | None:
