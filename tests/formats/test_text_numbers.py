@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 from clrt.formats.text_numbers import floats, padded, per_line, table
@@ -40,6 +41,14 @@ def test_numbers_are_those_of_python(lines: list[list[str]]) -> None:
         np.testing.assert_array_max_ulp(np.nan_to_num(found), np.nan_to_num(wanted), 1)
     assert malformed.tolist() == [number for number, each in enumerate(expected) if each is None]
     assert per_line(text, starts)[: len(lines)].tolist() == [len(line) for line in lines][: len(per_line(text, starts))]
+
+
+@pytest.mark.skipif(np.finfo(np.longdouble).nmant < 63, reason="no extended precision")
+def test_numbers_that_python_writes() -> None:
+    """Of those with up to 17 digits, nearly all are equal to the last bit."""
+    numbers = np.random.default_rng(1).normal(size=2000)
+    found, _, _ = floats(padded("\n".join(map(repr, numbers.tolist())).encode()))
+    assert np.mean(found == numbers) > 0.99
 
 
 def test_undefined_values_of_c_libraries() -> None:
