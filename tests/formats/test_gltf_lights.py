@@ -11,8 +11,9 @@ import pytest
 
 from clrt.errors import SceneError
 from clrt.formats.load_scene import load
-from clrt.formats.model_choice import LightUnit, ModelChoice
+from clrt.formats.model_choice import ModelChoice
 from clrt.output.scenes import save_scene
+from clrt.scene.axes_and_units import LightUnit
 from clrt.scene.default_sky import SUN
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 
@@ -123,7 +124,7 @@ def test_blenders_lights_have_blenders_strength(
     ],
 )
 def test_bright_lights_are_in_candela_and_lux(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, lights: list[tuple[str, float]], size: float, unit: str
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, lights: list[tuple[str, float]], size: float, unit: LightUnit
 ) -> None:
     """Bright for the size of the scene; one line says so, unless the unit was given."""
     gltf = lit(*({"type": kind, "intensity": strength} for kind, strength in lights))
@@ -136,10 +137,11 @@ def test_bright_lights_are_in_candela_and_lux(
     assert not caplog.records or "candela and lux" in caplog.text and "--light-unit radiometric" in caplog.text
     caplog.clear()
     expected = [strength / (683 if unit == "photometric" else 1) for _, strength in lights]
-    assert [getattr(light, "intensity", getattr(light, "irradiance", None))[0] for light in found] == pytest.approx(
-        expected
-    )
-    assert load(file, choice=ModelChoice(light_unit=unit)).lights == found  # type: ignore[arg-type]
+    strengths = [
+        light.irradiance if isinstance(light, DirectionalLight) else vars(light)["intensity"] for light in found
+    ]
+    assert [strength[0] for strength in strengths] == pytest.approx(expected)
+    assert load(file, choice=ModelChoice(light_unit=unit)).lights == found
     assert not caplog.records
 
 
