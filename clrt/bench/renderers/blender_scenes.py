@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...formats.model_choice import ModelChoice
 from ...formats.models import read_model
 from ...scene.lights import DirectionalLight
 from ...scene.materials.material_types import Diffuse
@@ -82,9 +83,8 @@ def exported(library: Any, made: Any, folder: Path) -> Scene:
             export_apply=True,
             export_cameras=True,
             export_lights=True,
-            export_import_convert_lighting_mode="COMPAT",
         )
-    model = read_model(file)
+    model = read_model(file, choice=ModelChoice(light_unit="photometric"))
     areas = [emissive_square(each) for each in made.objects if each.type == "LIGHT" and each.data.type == "AREA"]
     angle = sum(degrees(each.data.angle) for each in made.objects if each.type == "LIGHT" and each.data.type == "SUN")
     lights = [
