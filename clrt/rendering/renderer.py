@@ -163,10 +163,10 @@ class Renderer:
         self._aovs.begin(self.session, self.scene)
 
     def _turn_to(self, camera: Camera) -> None:
-        files, file = self.session.compiled.chosen_files["CAMERA"], camera_file(camera, self.settings.integrator)
+        current, file = self.session.compiled, camera_file(camera, self.settings.integrator)
         self.scene = replace(self.scene, camera=camera)
         self._compiled = [each.seen_by(camera, file) for each in self._compiled]
-        if files == [file]:
+        if current.seen_by(camera, file).has_text_of(current):
             self.session.look(camera)
         else:
             self._progress.session = self._make_picture()
