@@ -18,6 +18,8 @@ Flags = NDArray[np.bool_]
 PART = 1 << 16
 #: A fan's triangle is turned over if its projection onto the polygon's plane has less than −TOLERANCE of its area.
 TOLERANCE = 1e-9
+#: Cells of the grid, along an axis, to whose points a polygon's corners are rounded: cross products are exact in int64.
+GRID = 1 << 30
 #: Pairs of an ear and a vertex that are tested for overlap at a time, at most between two cuts of a polygon, and at
 #: most for all polygons; what is left after that becomes fans.
 PAIRS, MOST_PAIRS, WORK = 1 << 18, 1 << 22, 1 << 24
@@ -39,7 +41,7 @@ def triangulate(points: Floats, corners: NDArray[np.integer[Any]], sizes: Ints) 
             places = ranges((np.cumsum(sizes) - sizes)[turned], sizes[turned])
             flat = _projected(points[corners[places]], np.repeat(normals, sizes[turned], axis=0))
             clipped = ranges(ends[turned] - (sizes[turned] - 2), sizes[turned] - 2)
-            triangles[clipped] = places[_clip_ears(flat, sizes[turned])]
+            triangles[clipped] = places[_clip_ears(_snapped(flat, sizes[turned]), sizes[turned])]
     return triangles
 
 
@@ -81,7 +83,23 @@ def _projected(points: Floats, normals: Floats) -> Floats:
     return np.where(normals[rows, axis, None] < 0, flat[:, ::-1], flat)
 
 
-def _clip_ears(points: Floats, sizes: Ints) -> Ints:
+def _snapped(points: Floats, sizes: Ints) -> Ints:
+    """Round the polygons' coordinates to integers from 0 to GRID, each axis of each polygon on its own scale.
+
+    Slender polygons are sheared along the second axis first, since they may extend along a diagonal.
+    """
+    starts = np.cumsum(sizes) - sizes
+    x, y = (points - np.repeat(points[starts], sizes, axis=0)).T
+    slopes = np.add.reduceat(x * y, starts) / np.add.reduceat(x * x, starts)
+    sheared = np.column_stack([x, y - np.repeat(slopes, sizes) * x])
+    least = np.minimum.reduceat(sheared, starts)
+    extents = np.maximum.reduceat(sheared, starts) - least
+    offsets = sheared - np.repeat(least, sizes, axis=0)
+    rounded: Ints = np.rint(offsets * np.repeat(GRID / extents, sizes, axis=0)).astype(np.int64)
+    return rounded
+
+
+def _clip_ears(points: Ints, sizes: Ints) -> Ints:
     """Triangulate counter-clockwise polygons in the plane, (n, 2): indices, (m, 3), polygon after polygon."""
     owner = np.repeat(np.arange(len(sizes)), sizes)
     ring, clipped, work = np.arange(len(points)), [], 0
@@ -109,14 +127,17 @@ def _clip_ears(points: Floats, sizes: Ints) -> Ints:
     return triangles[np.argsort(owner[triangles[:, 0]], kind="stable")]
 
 
-def _ears(points: Floats, around: Ints, polygon: Ints) -> tuple[Flags, int]:
-    """Return which corners are ears: convex, and with no other vertex in the triangle with their neighbors.
+def _ears(points: Ints, around: Ints, polygon: Ints) -> tuple[Flags, int]:
+    """Return which corners are ears: convex, and with nothing else of the polygon in the triangle with their neighbors.
 
-    Vertices on its boundary count, too, unless the polygon would be without ears. Also returns the number of tests.
+    Vertices on its boundary count, too, unless the polygon would be without ears. Where edges turn back or have no
+    length, only those corners are ears. Also returns the number of tests.
     """
-    triangles = points[around]
-    a, b, c = triangles.transpose(1, 2, 0)
+    triangles = np.ascontiguousarray(points[around.T].transpose(0, 2, 1))
+    a, b, c = triangles
     turn = _cross(b - a, c - b)
+    back = turn == 0
+    back[back] = np.sum((b - a)[:, back] * (c - b)[:, back], axis=0) <= 0
     convex = np.flatnonzero(turn > 0)
     first, counts, vertices = _near(triangles, polygon, convex, np.flatnonzero(turn <= 0))
     too_many = np.bincount(polygon[convex], counts, polygon[-1] + 1) > MOST_PAIRS
@@ -124,33 +145,43 @@ def _ears(points: Floats, around: Ints, polygon: Ints) -> tuple[Flags, int]:
     touched, overlapped = np.zeros(len(polygon), np.bool_), (turn <= 0) | too_many[polygon]
     ends = np.cumsum(counts)
     for part in np.split(np.arange(len(convex)), np.searchsorted(ends, np.arange(PAIRS, ends[-1:].sum(), PAIRS))):
-        ears, at = np.repeat(convex[part], counts[part]), b[:, vertices[ranges(first[part], counts[part])]]
-        sides = np.stack([_cross(v[:, ears] - u[:, ears], at - u[:, ears]) for u, v in ((a, b), (b, c), (c, a))])
-        elsewhere = np.all([(at != corner[:, ears]).any(axis=0) for corner in (a, b, c)], axis=0)
-        touched[ears[(sides >= 0).all(axis=0) & elsewhere]] = True
-        overlapped[ears[(sides > 0).all(axis=0)]] = True
-    strict = ~(touched | overlapped)
-    enough = np.bincount(polygon[strict], minlength=polygon[-1] + 1) > 0
-    return np.where(enough[polygon], strict, ~overlapped), len(polygon) + int(counts.sum())
+        ears, others = np.repeat(convex[part], counts[part]), vertices[ranges(first[part], counts[part])]
+        touching, overlapping = _obstacles(triangles, ears, others)
+        touched[touching] = overlapped[overlapping] = True
+    found = ~overlapped
+    for better in (found & ~touched, back):
+        found = np.where((np.bincount(polygon[better], minlength=polygon[-1] + 1) > 0)[polygon], better, found)
+    return found, len(polygon) + int(counts.sum())
 
 
-def _near(triangles: Floats, polygon: Ints, ears: Ints, vertices: Ints) -> tuple[Ints, Ints, Ints]:
+def _obstacles(triangles: Ints, ears: Ints, others: Ints) -> tuple[Ints, Ints]:
+    """Return the ears whose triangle's boundary is within rounding of the other corner, and those whose interior is
+    entered by that corner or by its edges."""
+    corners = triangles[:, :, ears]
+    edges = corners[[1, 2, 0]] - corners
+    sides = _sides(corners, edges, triangles[1][:, others])
+    near = np.flatnonzero((sides >= -2 * (abs(edges[:, 0]) + abs(edges[:, 1]))).all(axis=0))
+    ears, others, sides, corners, edges = ears[near], others[near], sides[:, near], corners[..., near], edges[..., near]
+    before, at, after = triangles[..., others]
+    touching = (corners != at).any(axis=1).all(axis=0)
+    entered = [
+        ((sides > 0) | (sides == 0) & (_sides(corners, edges, end) > sides)).all(axis=0) for end in (before, after)
+    ]
+    return ears[touching], ears[entered[0] | entered[1]]
+
+
+def _near(triangles: Ints, polygon: Ints, ears: Ints, vertices: Ints) -> tuple[Ints, Ints, Ints]:
     """Return the vertices of an ear's polygon whose x or y is in the range of its triangle: for each ear the first one
     and their number in the third array.
 
-    triangles: (n, 3, 2), those of all corners, the vertex itself in the middle; polygon: their polygons, ascending.
+    triangles: (3, 2, n), those of all corners, the vertex itself in the middle; polygon: their polygons, ascending.
     """
     first, counts, sources = [], [], []
-    starts = np.flatnonzero(np.diff(polygon, prepend=-1))
     for axis in range(2):
-        coordinates = triangles[:, :, axis]
-        least = np.minimum.reduceat(coordinates[:, 1], starts)
-        extent = np.maximum.reduceat(coordinates[:, 1], starts) - least
-        offsets = (coordinates - least[polygon, None]) / np.where(extent > 0, extent, 1)[polygon, None]
-        keys = 2.0 * polygon[:, None] + offsets  # ascending within a polygon, and from one to the next
-        order = vertices[np.argsort(keys[vertices, 1])]
-        first.append(np.searchsorted(keys[order, 1], keys[ears].min(axis=1)))
-        counts.append(np.searchsorted(keys[order, 1], keys[ears].max(axis=1), "right") - first[axis])
+        keys = 2 * GRID * polygon + triangles[:, axis]  # ascending from one polygon to the next
+        order = vertices[np.argsort(keys[1, vertices])]
+        first.append(np.searchsorted(keys[1, order], keys[:, ears].min(axis=0)))
+        counts.append(np.searchsorted(keys[1, order], keys[:, ears].max(axis=0), "right") - first[axis])
         sources.append(order)
     along_x = counts[0] <= counts[1]
     return (
@@ -160,7 +191,12 @@ def _near(triangles: Floats, polygon: Ints, ears: Ints, vertices: Ints) -> tuple
     )
 
 
-def _cross(u: Floats, v: Floats) -> Floats:
+def _sides(corners: Ints, edges: Ints, points: Ints) -> Ints:
+    """Return the cross products of triangles' edges with vectors to points, (3, n): positive inside."""
+    return np.stack([_cross(edge, points - corner) for corner, edge in zip(corners, edges)])
+
+
+def _cross(u: Ints, v: Ints) -> Ints:
     """Return the cross products of vectors in the plane, (2, n)."""
-    product: Floats = u[0] * v[1] - u[1] * v[0]
+    product: Ints = u[0] * v[1] - u[1] * v[0]
     return product
