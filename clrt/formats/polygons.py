@@ -94,8 +94,9 @@ def _snapped(points: Floats, sizes: Ints) -> Ints:
     sheared = np.column_stack([x, y - np.repeat(slopes, sizes) * x])
     least = np.minimum.reduceat(sheared, starts)
     extents = np.maximum.reduceat(sheared, starts) - least
-    least, scales = (np.repeat(each, sizes, axis=0) for each in (least, GRID / extents))
-    return np.rint((sheared - least) * scales).astype(np.int64)
+    offsets = sheared - np.repeat(least, sizes, axis=0)
+    rounded: Ints = np.rint(offsets * np.repeat(GRID / extents, sizes, axis=0)).astype(np.int64)
+    return rounded
 
 
 def _clip_ears(points: Ints, sizes: Ints) -> Ints:
