@@ -154,7 +154,7 @@ def test_channel_types_of_exr_files(tmp_path: Path) -> None:
 
 
 def test_luminance_of_exr_files(tmp_path: Path) -> None:
-    """Y alone is grey, also with alpha; with chroma, subsampled or not, it is refused by name."""
+    """Y alone is grey, also with alpha; with chroma, subsampled or not, it is read right or refused by name."""
     grey = noise(4, 6)
     alpha = np.ones_like(grey)
     np.testing.assert_array_equal(
@@ -163,8 +163,12 @@ def test_luminance_of_exr_files(tmp_path: Path) -> None:
     exr(tmp_path / "full.exr", ("main", {"Y": grey, "RY": grey, "BY": grey}))
     (tmp_path / "half.exr").write_bytes(subsampled(grey))
     for name in ("full.exr", "half.exr"):
-        with pytest.raises(SceneError, match=f"{name}: contains luminance and chroma, the channels Y, RY and BY"):
-            read_picture(tmp_path / name)
+        try:
+            pixels = read_picture(tmp_path / name)
+        except SceneError as error:
+            assert f"{name}: contains luminance and chroma, the channels Y, RY and BY" in str(error)
+        else:  # OpenImageIO 3.1 converts subsampled images
+            np.testing.assert_allclose(pixels, np.repeat(grey[..., None], 3, axis=2), atol=1e-3)
 
 
 def subsampled(grey: FloatArray) -> bytes:

@@ -65,8 +65,10 @@ def picture(file: str) -> Found:
     kind = getattr(oiio, "FLOAT" if dtype == np.float32 else dtype.name.upper())
     buffer = _opened(file, chosen.part)
     pixels = buffer.get_pixels(kind) if buffer.read(chosen.part, 0, first, last, True, kind) else None
+    if pixels is None and "subsampling" in (complaint := _complaint(buffer)):  # as OpenImageIO 3.1 says of RY and BY
+        return {}, {"refused": LUMINANCE_CHROMA}
     if pixels is None:
-        raise ValueError(_complaint(buffer))
+        raise ValueError(complaint)
     pixels = _displayed(pixels[..., [channel - first for channel in channels]], spec)
     names = ("RGB" if len(chosen.colors) == 3 else "Y") + "A" * len(chosen.alpha)
     return {"pixels": pixels.astype(np.float32) if dtype == np.uint32 else pixels}, {"channels": names}
