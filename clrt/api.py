@@ -29,9 +29,9 @@ from .scene.model import Scene
 def load(
     path: StrPath,
     camera: str | None = None,
+    *,
     up: Axis | None = None,
     unit: Unit | None = None,
-    *,
     scene: str | int | None = None,
     variant: str | int | None = None,
     animation: str | int | None = None,

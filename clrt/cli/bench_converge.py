@@ -136,7 +136,7 @@ def converge_command(
 
 
 def _scenes(files: tuple[Path, ...], size: tuple[int, int] | None, integrators: tuple[Integrator, ...]) -> list[Scene]:
-    """The scenes of the files, each with every integrator if any are named."""
+    """Return the scenes of the files, each with every integrator if any are named."""
     from ..formats.load_scene import load
 
     loaded = [load(file) for file in files]
@@ -152,7 +152,7 @@ def _scenes(files: tuple[Path, ...], size: tuple[int, int] | None, integrators: 
 
 
 def _reference(file: Path, scenes: list[Scene], spp: int | None) -> Reference:
-    """The image of a file as the reference of the one scene."""
+    """Return the image of a file as the reference of the one scene."""
     from ..bench.convergence.reference import Reference
     from .render_job import read_reference
 
@@ -165,7 +165,7 @@ def _reference(file: Path, scenes: list[Scene], spp: int | None) -> Reference:
 
 
 def _choices(names: tuple[str, ...]) -> dict[str, dict[str, Any]]:
-    """The configurations of these names, by the contestants' names."""
+    """Return the configurations of these names, by the contestants' names."""
     from ..bench.convergence.contestants import CHOICES, MORE_CHOICES
 
     chosen = [name if name == "clrt" else f"clrt, {name}" for name in names] or list(CHOICES)

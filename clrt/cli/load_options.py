@@ -32,7 +32,6 @@ class LoadOptions:
     unit: Unit | None = flag(
         "--unit", type=OneOf(get_args(Unit)), help="Unit of a bare model's coordinates, to convert them to meters."
     )
-
     model_scene: str | None = flag(
         "--scene", metavar="NAME", help="Scene of a bare glTF file, by name or number; see `clrt info`."
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..errors import SceneError, UsageError
 from ..file_names import StrPath
-from ..scene.axes_and_units import Axis, Unit
+from ..scene.axes_and_units import CONVERTED, Axis, Unit
 from ..scene.default_sky import SUN, default_sky
 from ..scene.geometry.transform import rotation, transform_light
 from ..scene.model import Instance, Mesh, Model, Scene
@@ -57,7 +57,7 @@ def load(
     if reader and (up or unit):
         raise UsageError(f'{path}: up and unit are for model files; in a scene file, write up = "z" in a [[mesh]]')
     if reader and choice != DEFAULT:
-        raise SceneError(f"{path}: {choice.given()[0]}: is for bare models; leave {choice.given()[0]} out")
+        raise UsageError(f"{path}: {choice.given()[0]}: is for bare models; leave {choice.given()[0]} out")
     scene, problems = reader(path) if reader else (_load_model(path, camera, up, unit, choice, moving), [])
     views = [] if reader else [name for name in VIEWS if name not in scene.cameras]
     if camera is not None and camera not in views:
@@ -92,6 +92,10 @@ def _load_model(
     placing = {key: value for key, value in placing.items() if value != getattr(MeshTable, key)}
     if placing:
         model = placed_animation(model, upright(up or model.up, unit or "m"))
+    if model.converted_from is not None:
+        log.warning(
+            "%s: %s; --light-unit radiometric takes them as W/sr and W/m²", path, CONVERTED[model.converted_from]
+        )
     angle = None if view is None or view in model.cameras else VIEWS.get(view)
     turn = rotation((0.0, angle or 0.0, 0.0))
     camera = next(iter(model.cameras.values()), None) if angle is None else None

@@ -52,9 +52,7 @@ def read_model(path: StrPath, normals: Normals = "file", choice: ModelChoice = D
     if suffix in CHOOSING:
         return read(path, normals, choice)
     if choice != DEFAULT:
-        raise SceneError(
-            f"{path}: {choice.given()[0]}: only a glTF file has several to choose from; leave {choice.given()[0]} out"
-        )
+        raise SceneError(f"{path}: {choice.given()[0]}: is for glTF files; leave {choice.given()[0]} out")
     return read(path, normals)
 
 
@@ -91,12 +89,13 @@ def _off(path: Path) -> dict[str, Any]:
 def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals], Model]:
     """Return a reader from a parser, which returns the keyword arguments of trimesh's classes for one mesh (vertices,
     faces, vertex_normals, uv, vertex_colors), or for several by name in `geometry`, and which axis is `up` unless it is
-    y; it may raise anything."""
+    y; it raises SceneError for a malformed file."""
 
     def read(path: Path, normals: Normals) -> Model:
         try:
-            parts = _parsed(parse, path)
-            return Model(meshes=_meshes(parts, name_of(path), normals), up=parts.get("up", "y"))
+            with np.errstate(all="ignore"):
+                parts = parse(path)
+            return Model(meshes=_meshes(path, parts, normals), up=parts.get("up", "y"))
         except SceneError as error:
             raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
@@ -117,29 +116,16 @@ SUFFIXES = tuple(FORMATS)
 CHOOSING = {".glb", ".gltf"}
 
 
-def _parsed(parse: Callable[[Path], dict[str, Any]], path: Path) -> dict[str, Any]:
-    try:
-        with np.errstate(all="ignore"):
-            return parse(path)
-    except SceneError:
-        raise
-    except Exception as error:  # a damaged file may make trimesh's parsers raise anything
-        # On undecodable bytes trimesh raises an ImportError about an encoding detector: no help to the user.
-        detail = "" if isinstance(error, ImportError) else f" ({type(error).__name__}: {error})"
-        name = path.suffix[1:].upper()
-        raise SceneError(f"cannot be read as {name}{detail}; export the model again") from error
-
-
-def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
+def _meshes(path: Path, parts: dict[str, Any], normals: Normals) -> list[Mesh]:
     """Build meshes from trimesh's keyword arguments for one mesh or for several."""
-    several = parts.get("geometry", {stem: parts})
+    several = parts.get("geometry", {name_of(path): parts})
     pieces = {name: piece for name, piece in several.items() if _size(piece.get("faces"))}
     if not pieces:
         raise SceneError("contains no triangles (points and lines are ignored); export a triangle mesh")
     meshes, problems = [], []
     for name, piece in pieces.items():
         try:
-            meshes.append(_mesh(str(name), piece, normals))
+            meshes.append(_mesh(path, str(name), piece, normals))
         except SceneError as error:
             problems += error.problems
     if problems:
@@ -147,29 +133,24 @@ def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
     return meshes
 
 
-def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
+def _mesh(path: Path, name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
     """Build one mesh from trimesh's arrays, with its indices validated before use."""
-    try:
-        with np.errstate(over="ignore"):
-            vertices = np.ascontiguousarray(piece["vertices"], np.float32)
-            stored = piece.get("vertex_normals")
-            stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
-            uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
-        faces = np.asarray(piece["faces"])
-        faces = faces if np.issubdtype(faces.dtype, np.integer) else faces.astype(np.int64)
-    except (TypeError, ValueError):
-        raise SceneError(f'mesh "{name}": its lines have different numbers of values; export it again') from None
+    with np.errstate(over="ignore"):
+        vertices = np.ascontiguousarray(piece["vertices"], np.float32)
+        stored = piece.get("vertex_normals")
+        stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
+        uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
     colors = _linear_colors(piece.get("vertex_colors"))
     plain = Diffuse() if colors is None else Diffuse(color=(1.0, 1.0, 1.0))
     material = piece.get("material") or plain
     if uv is None and material.textures():
-        log.warning('mesh "%s" has no texture coordinates; the textures of its material are ignored', name)
+        log.warning('%s: mesh "%s" has no texture coordinates; the textures of its material are ignored', path, name)
         material = material.without_textures()
     if colors is not None and colors.shape[1] == 4 and material.opacity == 1:
         material = replace(material, opacity=BELOW_ONE)
     mesh = Mesh(
         vertices,
-        faces,
+        piece["faces"],
         material,
         name=name,
         material_name=piece.get("material_name", ""),

@@ -20,15 +20,13 @@ from .ply.elements import Lists
 from .ply.triangles import Triangles
 from .polygons import ranges
 from .referenced_files import name_of
-from .seams import with_corner_attributes
+from .seams import PLAIN, with_corner_attributes
 from .text_numbers import numbers
 
 Doubles = NDArray[np.float64]
 Ints = NDArray[np.int64]
 _COMMENT = re.compile(rb"#[^\n]*")
 _KEYWORD = re.compile(rb"\s*(ST)?(C)?(N)?(4)?(n)?(?:OFF|off)(?=\s|\d)[ \t]*(BINARY)?")
-#: Encoded value of the default material's color, for faces without a color beside others.
-PLAIN = 0.9063
 
 
 class Lines(NamedTuple):
@@ -65,7 +63,7 @@ def parse_off(path: Path) -> dict[str, Any]:
     ends = (1, 1 + vertices, 1 + vertices + faces)
     first, second, third = np.append(starts, len(lines.numbers))[list(ends)].tolist()
     whole = _vertices(Lines(lines.numbers[first:second], lines.counts[ends[0] : ends[1]]), keyword)
-    return _with_faces(whole, Lines(lines.numbers[second:third], lines.counts[ends[1] : ends[2]]), name_of(path))
+    return _with_faces(path, whole, Lines(lines.numbers[second:third], lines.counts[ends[1] : ends[2]]))
 
 
 def _malformed(fault: str) -> SceneError:
@@ -91,7 +89,7 @@ def _vertices(lines: Lines, keyword: re.Match[bytes] | None) -> dict[str, Any]:
     }
 
 
-def _with_faces(whole: dict[str, Any], lines: Lines, name: str) -> dict[str, Any]:
+def _with_faces(path: Path, whole: dict[str, Any], lines: Lines) -> dict[str, Any]:
     """Return the arrays with the triangles of faces, and with the faces' colors if vertices have none."""
     starts = np.cumsum(lines.counts) - lines.counts
     sizes = lines.numbers[starts].astype(np.int64)
@@ -100,8 +98,9 @@ def _with_faces(whole: dict[str, Any], lines: Lines, name: str) -> dict[str, Any
         raise _malformed("has a face with fewer values than it counts")
     corners = lines.numbers[ranges(starts + 1, sizes)].astype(np.int64)
     triangles = Triangles(Lists(sizes, corners), whole["vertices"])
-    if problems := index_problems(triangles.vertices, len(whole["vertices"]), f'mesh "{name}"'):
+    if problems := index_problems(triangles.vertices, len(whole["vertices"]), f'mesh "{name_of(path)}"'):
         raise SceneError(problems)
+    triangles.warn_of_ignored(path)
     whole = {**whole, "faces": triangles.vertices}
     colored = extra >= 3
     if whole["vertex_colors"] is not None or not colored.any():

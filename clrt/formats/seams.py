@@ -1,4 +1,4 @@
-"""Splitting of vertices whose faces differ in texture coordinates or colors."""
+"""Attributes of faces and their corners: splitting of vertices whose faces differ in them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+#: The default material's color, encoded, for faces without a color in files whose other faces have one.
+PLAIN = 0.9063
 
 
 def with_corner_attributes(whole: Mapping[str, Any], of_corners: Mapping[str, Array]) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from ..file_names import printable
 from ..scene.editing import free_name
 from ..threads import in_parallel
 from .referenced_files import name_of
+from .seams import PLAIN
 from .text_numbers import floats, padded, reuse_memory
 
 log = logging.getLogger(__name__)
@@ -34,8 +35,6 @@ CHUNK = 1 << 18
 #: A line that begins a solid, up to a facet on the same line.
 _SOLID = re.compile(rb"solid[^\r\n]*?(?=\s+facet\s+normal\s|[\r\n]|\Z)")
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
-#: Encoded value of the default material's color, for facets without a color beside others.
-PLAIN = 0.9063
 
 
 def parse_stl(path: Path) -> dict[str, Any]:
@@ -46,12 +45,12 @@ def parse_stl(path: Path) -> dict[str, Any]:
     """
     content = path.read_bytes()
     if _is_binary(content):
-        return _binary(content)
+        return _binary(path, content)
     if b"vertex" not in content[:START]:
         content = content.lower()
     solids: dict[str, dict[str, Any]] = {}
     for name, text in _solids(content):
-        if len(corners := _corners(text)):
+        if len(corners := _corners(path, text)):
             solids[free_name(printable(name) or name_of(path), solids)] = _soup(corners)
     return {"geometry": solids, "up": "z"}
 
@@ -67,13 +66,13 @@ def _soup(corners: NDArray[np.floating]) -> dict[str, Any]:
     return {"vertices": corners, "faces": np.arange(len(corners), dtype=np.int32).reshape(-1, 3)}
 
 
-def _binary(content: bytes) -> dict[str, Any]:
+def _binary(path: Path, content: bytes) -> dict[str, Any]:
     """Return the facets of a binary file: as many as its header counts, or those that are there."""
     count, stored = int.from_bytes(content[80:HEADER], "little"), max(len(content) - HEADER, 0) // FACET
     if stored == 0:
         return {"geometry": {}}
     if not 0 < count <= stored:
-        log.warning("its header counts %d facets; the %d that it contains are read", count, stored)
+        log.warning("%s: its header counts %d facets; the %d that it contains are read", path, count, stored)
         count = stored
     corners = np.ndarray(count, "V36", content, HEADER + 12, FACET).copy().view("<f4").reshape(-1, 3)
     attributes = np.ndarray(count, "<u2", content, HEADER + 48, FACET)
@@ -99,7 +98,7 @@ def _colors(header: bytes, attributes: NDArray[np.uint16]) -> NDArray[np.float32
 
 
 def _solids(text: bytes) -> Iterator[tuple[str, bytes]]:
-    """Yield the name of each solid and the text of its facets, also if there is no line that begins it."""
+    """Yield the name of each solid and the text of its facets, also of facets before the first solid."""
     name, start, place = "", 0, 0
     while (place := text.find(b"solid", place)) >= 0:
         is_end = text[max(place - 3, 0) : place] == b"end"
@@ -112,10 +111,10 @@ def _solids(text: bytes) -> Iterator[tuple[str, bytes]]:
     yield name, text[start:]
 
 
-def _corners(text: bytes) -> NDArray[np.float64]:
+def _corners(path: Path, text: bytes) -> NDArray[np.float64]:
     """Return the corners of a solid's triangles, (3m, 3)."""
     reuse_memory()
-    parts = in_parallel(lambda limits: _regular(text[slice(*limits)]), _chunks(text))
+    parts = in_parallel(lambda limits: _regular(path, text[slice(*limits)]), _chunks(text))
     return np.concatenate([np.zeros((0, 3)), *parts])
 
 
@@ -130,19 +129,19 @@ def _chunks(text: bytes) -> Iterator[tuple[int, int]]:
         start = end
 
 
-def _regular(text: bytes) -> NDArray[np.float64]:
+def _regular(path: Path, text: bytes) -> NDArray[np.float64]:
     """Return the corners in a text of facets, each with a normal and three vertices."""
     plain = text.replace(b"facet normal", b"%d " % MARK)
     for word in WORDS:
         plain = plain.replace(word, b"")
     values, _, malformed = floats(padded(plain))
     if malformed.size or len(values) % 13:
-        return _irregular(text)
+        return _irregular(path, text)
     numbers = values.reshape(-1, 13)
-    return numbers[:, 4:].reshape(-1, 3) if np.all(numbers[:, 0] == MARK) else _irregular(text)
+    return numbers[:, 4:].reshape(-1, 3) if np.all(numbers[:, 0] == MARK) else _irregular(path, text)
 
 
-def _irregular(text: bytes) -> NDArray[np.float64]:
+def _irregular(path: Path, text: bytes) -> NDArray[np.float64]:
     """Return the corners in any text: of each facet with three vertices or more, a fan."""
     corners, ignored = list[tuple[float, ...]](), 0
     for facet in text.split(b"endfacet"):
@@ -151,7 +150,7 @@ def _irregular(text: bytes) -> NDArray[np.float64]:
         for second, third in zip(points[1:], points[2:]):
             corners += [points[0], second, third]
     if ignored:
-        log.warning("%d facets with fewer than 3 vertices are ignored", ignored)
+        log.warning("%s: ignored: %d facets with fewer than 3 vertices", path, ignored)
     return np.array(corners, np.float64).reshape(-1, 3)
 
 

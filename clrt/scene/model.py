@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ClrtError
 from .animation import Animation, ModelAnimation
-from .axes_and_units import Axis
+from .axes_and_units import Axis, LightUnit
 from .cameras import Camera as Camera
 from .fields.limits import Gt
 from .fields.number_arrays import real_array, whole_array
@@ -92,6 +92,7 @@ class Model:
     - animation: the file's first one, or the one that was chosen
     - contents: names of all that can be chosen, by kind: scenes, animations, variants
     - up: which of the file's axes points up
+    - converted_from: the unit of the lights in the file, if it was guessed and they were converted
     """
 
     meshes: list[Mesh]
@@ -101,6 +102,7 @@ class Model:
     animation: ModelAnimation | None = None
     contents: Mapping[str, Sequence[str]] = field(default_factory=dict)
     up: Axis = "y"
+    converted_from: LightUnit | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

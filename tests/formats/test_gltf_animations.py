@@ -207,10 +207,10 @@ def test_poses_in_scene_files(path: Path) -> None:
 def test_choices_that_a_file_does_not_have(path: Path, folder: Path) -> None:
     with pytest.raises(SceneError, match='a.glb: animation: "run" is unknown; use one of "walk", "animation 1"'):
         clrt.load(path, animation="run")
-    with pytest.raises(SceneError, match="triangle.obj: animation: only a glTF file has several"):
+    with pytest.raises(SceneError, match="triangle.obj: animation: is for glTF files; leave animation out"):
         clrt.load(folder / "models" / "triangle.obj", animation=0)
     (folder / "a.toml").write_text("sphere = [{}]\n")
-    with pytest.raises(SceneError, match=r"a.toml: time: is for bare models; leave time out"):
+    with pytest.raises(UsageError, match=r"a.toml: time: is for bare models; leave time out"):
         clrt.load(folder / "a.toml", time=1)
     with pytest.raises(SceneError, match=r"animation: 0 is unknown; the file has none; leave animation out"):
         clrt.load(ball().write(folder / "still.glb"), time=1.0)

@@ -145,7 +145,8 @@ def test_bright_lights_are_in_candela_and_lux(
     assert not caplog.records
 
 
-def test_units_of_scene_files(tmp_path: Path) -> None:
+def test_units_of_scene_files(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """A message says how lights were converted if they are used and no unit was given."""
     gltf = lit({"type": "directional", "intensity": 6830})
     gltf.node(rotation=DOWN, extensions=held(0))
     gltf.write(tmp_path / "sun.glb")
@@ -153,8 +154,13 @@ def test_units_of_scene_files(tmp_path: Path) -> None:
     for unit, irradiance in {None: 10, "photometric": 10, "radiometric": 6830, "blender": 6830}.items():
         line = "" if unit is None else f'light_unit = "{unit}"\n'
         scene.write_text(f'[[mesh]]\nfile = "sun.glb"\nlights = true\n{line}')
+        caplog.clear()
         (sun,) = load(scene).lights
         assert isinstance(sun, DirectionalLight) and sun.irradiance == pytest.approx([irradiance] * 3)
+        assert ('candela and lux, and divided by 683 lm/W; light_unit = "radiometric"' in caplog.text) == (unit is None)
+    caplog.clear()
+    scene.write_text('[[mesh]]\nfile = "sun.glb"\n')
+    assert load(scene).lights == [] and not caplog.records
     scene.write_text('[[mesh]]\nfile = "sun.glb"\nlight_unit = "lumen"\n')
     with pytest.raises(SceneError, match=r'light_unit: "lumen".*photometric'):
         load(scene)

@@ -266,7 +266,7 @@ def test_points_become_spheres(tmp_path: Path, caplog: pytest.LogCaptureFixture)
     radii = np.linalg.norm(mesh.vertices - np.where(near[:, None], [0, 0, 0], [5, 0, 0]), axis=1)
     np.testing.assert_allclose(radii, np.where(near, 1, 2), rtol=1e-6)
     np.testing.assert_array_equal(mesh.colors, np.where(near[:, None], [1, 0, 0], [0, 0, 1]))
-    assert "2 points without a finite position and a positive radius are ignored" in caplog.text
+    assert "a.ply: ignored: 2 points without a finite position and a positive radius" in caplog.text
     load(tmp_path / "a.ply")
 
 
@@ -291,7 +291,7 @@ def test_missing_points_of_scans(tmp_path: Path, caplog: pytest.LogCaptureFixtur
     for encoding in ENCODINGS:
         mesh = read(tmp_path / "a.ply", written([vertices, ("face", CORNERS, faces)], encoding))
         assert area(mesh) == 1 and np.isfinite(mesh.vertices).all()
-    assert "2 faces with fewer than 3 corners are ignored" in caplog.text
+    assert "a.ply: ignored: 2 faces with fewer than 3 corners" in caplog.text
     content = written([vertices, ("face", CORNERS, faces)], "ascii")
     assert area(read(tmp_path / "a.ply", content.replace(b"nan", b"-1.#IND").replace(b"-inf", b"-nan(ind)"))) == 1
     with pytest.raises(SceneError, match=r"vertices\[4\] = \[nan, nan, nan\] is not finite"):

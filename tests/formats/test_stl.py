@@ -111,7 +111,7 @@ def test_facets_of_other_sizes(tmp_path: Path, caplog: pytest.LogCaptureFixture)
     facet = "facet normal 0 0 1\nouter loop\n{}\nendloop\nendfacet\n"
     content = "solid a\n" + facet.format("\n".join(lines)) + facet.format("\n".join(lines[:2])) + "endsolid a\n"
     check(tmp_path / "a.stl", content, np.array(vertices, np.float32)[[[0, 1, 2], [0, 2, 3]]])
-    assert "1 facets with fewer than 3 vertices are ignored" in caplog.text
+    assert "a.stl: ignored: 1 facets with fewer than 3 vertices" in caplog.text
     with pytest.raises(SceneError, match='a vertex "1 one 0" needs 3 numbers'):
         read(tmp_path / "a.stl", content.replace("1 1 0", "1 one 0"))
 

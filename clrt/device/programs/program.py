@@ -2,9 +2,9 @@
 
 A program's text is a preamble (records, choices, features) followed by whole kernel files. Names in quotation marks
 after #include are resolved here, each file once, and `#include NAME` stands for the files that the scene selects for
-NAME, possibly none.
-So the text has exactly what the scene needs. `--print-kernel` shows what is compiled, except for the suffix of kernel
-names (bitcode.py). The known problems of -I (spaces in paths, driver caches that ignore included files) cannot occur.
+NAME, possibly none. So the text has exactly what the scene needs. `--print-kernel` shows what is compiled, except for
+the suffix of kernel names (bitcode.py). The known problems of -I (spaces in paths, driver caches that ignore included
+files) cannot occur.
 """
 
 from __future__ import annotations

@@ -24,11 +24,6 @@ EFFICACY = 683.0
 #: Irradiance of the brightest light above which it is taken as lux: it is near the geometric mean of what lights a
 #: scene well, 1 to 10 W/m², and of the same in lux.
 BRIGHTEST = 50.0
-#: What is said of lights that are converted.
-GUESSES: dict[LightUnit, str] = {
-    "photometric": "the lights are taken as candela and lux, and divided by 683 lm/W",
-    "blender": "the lights are taken as watts, which versions of Blender before 3.6 write",
-}
 #: Blender's exporter before version 3.6 wrote the numbers that Blender shows.
 OLD_BLENDER = re.compile(r"Khronos Blender glTF 2\.0|Khronos glTF Blender I/O v([0-2]\.|3\.[0-5]\.)")
 

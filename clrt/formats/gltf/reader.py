@@ -29,7 +29,7 @@ from .animations import Clip, animation_names
 from .cameras import read_cameras
 from .graph import NodeGraph
 from .instancing import matrices, shown
-from .light_units import GUESSES, guess_unit, to_radiometric
+from .light_units import guess_unit, to_radiometric
 from .lights import read_lights
 from .materials import Materials
 from .morph_targets import weights_of
@@ -86,8 +86,8 @@ class GltfFile:
         asked = clip if self._choice.animated else None
         model, cameras = self._posed(asked, self._choice.time or 0.0)
         self._warn([*left_out, *cameras, *(asked.ignored if asked else [])])
-        if model.lights and self._choice.light_unit is None and self._unit in GUESSES:
-            log.warning("%s: %s; --light-unit radiometric takes them as W/sr and W/m²", self._path, GUESSES[self._unit])
+        if model.lights and self._choice.light_unit is None and self._unit != "radiometric":
+            model.converted_from = self._unit
         model.contents = self._names
         if clip is not None and self._choice.time is None:
             base = replace(model, meshes=list(model.meshes), instances=list(model.instances), lights=list(model.lights))
@@ -123,12 +123,10 @@ class GltfFile:
         problems = [problem for mesh in every for problem in mesh_problems(mesh, "mesh")]
         if problems:
             raise SceneError(problems)
-        middle = np.mean(bounds(meshes, instances), axis=0)
-        cameras, left_out = read_cameras(document, graph.placed, middle)
+        box = np.stack(bounds(meshes, instances))
+        cameras, left_out = read_cameras(document, graph.placed, box.mean(axis=0))
         lights = list(read_lights(document, graph.placed))
-        self._unit = self._unit or guess_unit(
-            lights, str(document.asset.generator), np.stack(bounds(meshes, instances))
-        )
+        self._unit = self._unit or guess_unit(lights, str(document.asset.generator), box)
         lights = [to_radiometric(light, self._unit) for light in lights]
         return Model(meshes=meshes, instances=instances, cameras=cameras, lights=lights), left_out
 

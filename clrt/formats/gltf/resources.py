@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import base64
 import binascii
-import logging
 import re
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from urllib.parse import unquote, unquote_to_bytes
 
 from ...errors import SceneError
-from ..referenced_files import note_read
+from ..referenced_files import find_file, note_read
 
-log = logging.getLogger(__name__)
 _DATA = re.compile(r"data:([^,]*),", re.IGNORECASE)
 _SPACE = re.compile(rb"\s+")
 
@@ -20,20 +18,16 @@ _SPACE = re.compile(rb"\s+")
 def read_uri(model: Path, uri: str, user: str) -> bytes:
     """Return the content of a URI in the file `model`: data embedded in it, or a file relative to the model.
 
-    File names may be percent-encoded or not, and have backslashes. Where there is no such file, one that differs in
-    case alone is read, with a warning. Raises SceneError naming the `user`.
+    File names may be percent-encoded or not; see `find_file` for what else they may be. Raises SceneError naming the
+    `user`.
     """
     if head := _DATA.match(uri):
         return _embedded(head[1], uri[head.end() :], user)
-    name = unquote(uri)
+    name = uri if (model.parent / uri).is_file() else unquote(uri)
     try:
-        for each in (name, uri, name.replace("\\", "/")):
-            if (file := model.parent / each).is_file():
-                return note_read(file).read_bytes()
-        if near := _in_another_case(model.parent, name.replace("\\", "/")):
-            log.warning('%s: %s: there is no file "%s"; read "%s" instead', model, user, name, near.name)
-            return note_read(near).read_bytes()
-    except (OSError, ValueError):
+        if file := find_file(model, [model.parent], name):
+            return note_read(file).read_bytes()
+    except OSError:
         pass
     raise SceneError(f'{user}: cannot read the file "{name[:200]}"; put it next to the model')
 
@@ -48,21 +42,3 @@ def _embedded(kind: str, data: str, user: str) -> bytes:
         return base64.b64decode(content + b"=" * (-len(content) % 4), validate=True)
     except (binascii.Error, ValueError):
         raise SceneError(f"{user}: its data URI is not base64; export the file again") from None
-
-
-def _in_another_case(folder: Path, name: str) -> Path | None:
-    """Return the only file of this name in any case; None if there is none, or several."""
-    found = [folder]
-    for part in PurePosixPath(name).parts:
-        if part == "..":
-            found = [each.parent for each in found]
-        else:
-            found = [
-                each
-                for above in found
-                if above.is_dir()
-                for each in above.iterdir()
-                if each.name.lower() == part.lower()
-            ]
-    files = [each for each in found if each.is_file()]
-    return files[0] if len(files) == 1 else None

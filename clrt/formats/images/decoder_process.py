@@ -41,7 +41,7 @@ def fits(decoded: int, stored: int) -> bool:
 
 def picture(file: str) -> Found:
     """Return an image's pixels, (h, w, c) uint8, uint16 or float32 as stored, with unassociated alpha: red, green and
-    blue, or grey, then alpha if there is any. They fill the display window, black where there is no data.
+    blue, or grey, then alpha if there is any. They fill the display window, and are black outside of the data window.
 
     Facts: which channels they are, as "RGB", "RGBA", "Y" or "YA"; or what is missing, as `refused`.
     """

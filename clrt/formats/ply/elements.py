@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ..polygons import ranges
 from ..text_numbers import numbers
 from .header import Element, Header, Property, parse_header
 
@@ -121,8 +122,7 @@ def _uneven(content: bytes, start: int, element: Element, order: str) -> tuple[C
         kind = "u1" if _size(each.count_kind) == 1 else order + each.count_kind
         counts = _values(content, kind, place).astype(np.int64)
         place = place + _size(each.count_kind)
-        within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        offsets = np.repeat(place, counts) + within * _size(each.kind)
+        offsets = np.repeat(place, counts) + ranges(np.zeros_like(counts), counts) * _size(each.kind)
         columns.lists[each.name] = Lists(counts, _values(content, order + each.kind, offsets))
         place = place + counts * _size(each.kind)
     return columns, end

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,10 @@ FRACTION = 0.35
 ROUNDS = 20
 
 
-def point_spheres(points: Doubles, radii: Doubles | None, colors: NDArray[Any] | None) -> dict[str, Any]:
-    """Return trimesh's keyword arguments for the spheres of points (n, 3); radii: (n,), or None to derive one from the
-    spacing of the points; colors: (n, k), or None.
+def point_spheres(path: Path, points: Doubles, radii: Doubles | None, colors: NDArray[Any] | None) -> dict[str, Any]:
+    """Return trimesh's keyword arguments for the spheres of a file's points (n, 3).
+
+    radii: (n,), or None to derive one from the spacing of the points; colors: (n, k), or None.
 
     Points that are not finite, and radii that are not positive, are ignored with a warning.
     """
@@ -32,9 +34,9 @@ def point_spheres(points: Doubles, radii: Doubles | None, colors: NDArray[Any] |
         usable &= np.isfinite(radii) & (radii > 0)
     chosen = np.flatnonzero(usable)
     if ignored := len(points) - len(chosen):
-        log.warning("%d points without a finite position and a positive radius are ignored", ignored)
+        log.warning("%s: ignored: %d points without a finite position and a positive radius", path, ignored)
     if (step := -(-len(chosen) // MOST_POINTS)) > 1:
-        log.warning("of %d points, every %d. is rendered; the limit is %d", len(chosen), step, MOST_POINTS)
+        log.warning("%s: %d points, of which every %d. is rendered, at most %d", path, len(chosen), step, MOST_POINTS)
         chosen = chosen[::step]
     points = points[chosen]
     radius = np.full(len(points), spacing_radius(points)) if radii is None else radii[chosen]

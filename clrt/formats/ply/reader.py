@@ -15,7 +15,7 @@ from ...scene.materials.material_types import Diffuse
 from ...scene.materials.textures import Picture, Texture
 from ...scene.validation.validate import index_problems
 from ..images.image_reader import read_texels
-from ..referenced_files import name_of
+from ..referenced_files import find_file, name_of
 from ..seams import with_corner_attributes
 from .attributes import Array, colors_of, columns_of, coordinates_of, corner_coordinates
 from .elements import Columns, Lists, read_elements
@@ -40,7 +40,7 @@ def parse_ply(path: Path) -> dict[str, Any]:
     # Coordinates of a reference system, as surveys name one in a comment, have the height as the last.
     up = "z" if any(comment.lower().startswith("crs ") for comment in header.comments) else "y"
     if sum(columns.number for columns in elements.values()) == vertex.number:
-        return point_spheres(points, vertex.scalars.get("radius"), colors_of(vertex)) | {"up": up}
+        return point_spheres(path, points, vertex.scalars.get("radius"), colors_of(vertex)) | {"up": up}
     found = faces_of(elements)
     triangles = None if found is None else Triangles(found[1], points)
     faces = strip_triangles(elements) if triangles is None else triangles.vertices
@@ -55,6 +55,7 @@ def parse_ply(path: Path) -> dict[str, Any]:
     }
     textures = np.zeros(len(faces), np.int64)
     if found is not None and triangles is not None:
+        triangles.warn_of_ignored(path)
         whole = with_corner_attributes(whole, _of_corners(*found, triangles, whole["vertex_colors"] is None))
         if "texnumber" in found[0].scalars:
             textures = found[0].scalars["texnumber"].astype(np.int64)[triangles.polygons]
@@ -102,16 +103,12 @@ def _part(whole: dict[str, Any], chosen: Array) -> dict[str, Any]:
 
 
 def _textured(path: Path, name: str = "") -> dict[str, Any]:
-    """Return the material of a texture next to the model, also if its name is a path on another computer.
-
-    None if there is no texture, and with a warning if it cannot be read.
-    """
+    """Return the material of a texture next to the model: nothing without one, or with a warning if it cannot be
+    read."""
     if not name:
         return {}
-    file = path.parent / name
-    if not file.is_file():
-        file = path.parent / name.replace("\\", "/").rpartition("/")[2]
     try:
+        file = find_file(path, [path.parent], name) or path.parent / name
         texture = Texture(picture=Picture(read_texels(file), printable(name)))
     except (SceneError, OSError, ValueError) as error:
         log.warning("%s: a texture is ignored: %s", path, error)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,11 @@ class Triangles:
         self._items = items if np.issubdtype(items.dtype, np.integer) else items.astype(np.int64)
         self._all_triangles = len(items) == 3 * len(self._counts) and bool(np.all(self._counts == 3))
 
+    def warn_of_ignored(self, path: Path) -> None:
+        """Log how many polygons of the file have fewer than three corners."""
+        if ignored := int((self._counts < 3).sum()):
+            log.warning("%s: ignored: %d faces with fewer than 3 corners", path, ignored)
+
     @cached_property
     def vertices(self) -> NDArray[Any]:
         """(m, 3), of any integer dtype: the vertices of each triangle."""
@@ -38,8 +44,6 @@ class Triangles:
         if self._all_triangles:
             return np.arange(len(self._items)).reshape(-1, 3)
         kept = self._counts > 2
-        if ignored := int((~kept).sum()):
-            log.warning("%d faces with fewer than 3 corners are ignored", ignored)
         sizes = self._counts[kept]
         corners = ranges((np.cumsum(self._counts) - self._counts)[kept], sizes)
         items = self._items[corners]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from ...errors import SceneError
-from ...scene.axes_and_units import Axis, LightUnit, Unit
+from ...scene.axes_and_units import CONVERTED, Axis, LightUnit, Unit
 from ...scene.fields.limits import Ge, Le, Lt
 from ...scene.geometry.creases import creased
 from ...scene.geometry.instancing import meshes_by_id
@@ -24,6 +25,7 @@ from ..models import read_model
 from ..up_axis import upright
 from .placement import Transform
 
+log = logging.getLogger(__name__)
 Vertex = Annotated[int, Ge(0), Lt(2**31)]
 
 
@@ -107,6 +109,13 @@ class MeshTable(Transform):
             model = read_model(folder / file, self.normals, choice)
         except SceneError as error:
             raise SceneError([f"{where}.file: {problem}" for problem in error.problems]) from None
+        if self.lights and model.converted_from is not None:
+            log.warning(
+                '%s: %s: %s; light_unit = "radiometric" takes them as W/sr and W/m²',
+                where,
+                file,
+                CONVERTED[model.converted_from],
+            )
         if self.name is not None:
             parts: list[Mesh | Instance] = [*model.meshes, *model.instances]
             for part in parts:

@@ -36,9 +36,7 @@ MAPS: dict[str, Kind] = {
 #: Maps of normals, and those of heights, in which exporters also store normals.
 NORMALS, BUMPS = ("norm", "map_kn", "map_norm", "map_normal"), ("map_bump", "bump")
 KEYS = {"kd", "ks", "ke", "ns", "ni", "tf", "tr", "d", "illum", "pr", "pm", *OTHERS}
-
-
-#: In the name of a file a # is no comment.
+#: A comment; a # within a file name does not begin one.
 COMMENT = re.compile(r"\s#.*")
 
 
