@@ -93,9 +93,9 @@ def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals
 
     def read(path: Path, normals: Normals) -> Model:
         try:
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"):  # values that are not finite are reported
                 parts = parse(path)
-            return Model(meshes=_meshes(path, parts, normals), up=parts.get("up", "y"))
+                return Model(meshes=_meshes(path, parts, normals), up=parts.get("up", "y"))
         except SceneError as error:
             raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
@@ -135,11 +135,10 @@ def _meshes(path: Path, parts: dict[str, Any], normals: Normals) -> list[Mesh]:
 
 def _mesh(path: Path, name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
     """Build one mesh from trimesh's arrays, with its indices validated before use."""
-    with np.errstate(over="ignore"):
-        vertices = np.ascontiguousarray(piece["vertices"], np.float32)
-        stored = piece.get("vertex_normals")
-        stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
-        uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
+    vertices = np.ascontiguousarray(piece["vertices"], np.float32)
+    stored = piece.get("vertex_normals")
+    stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
+    uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
     colors = _linear_colors(piece.get("vertex_colors"))
     plain = Diffuse() if colors is None else Diffuse(color=(1.0, 1.0, 1.0))
     material = piece.get("material") or plain

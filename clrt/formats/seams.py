@@ -16,7 +16,7 @@ PLAIN = 0.9063
 def with_corner_attributes(whole: Mapping[str, Any], of_corners: Mapping[str, Array]) -> dict[str, Any]:
     """Return a mesh, trimesh's names of arrays, with attributes by corner of its faces, (3m, k) each, in place of those
     by vertex; vertices whose corners differ in them are split."""
-    if not of_corners:
+    if not of_corners or not len(whole["faces"]):
         return dict(whole)
     vertices, count = np.ravel(whole["faces"]), len(whole["vertices"])
     faces, corner = _split(vertices, count, np.column_stack(list(of_corners.values())))

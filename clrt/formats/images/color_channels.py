@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ...file_names import printable
+
 #: Names of the layer that has the image itself, beside others such as "diffuse" or "albedo".
 BEAUTY = ("", "rgba", "rgb", "beauty", "combined", "color", "colour", "image", "left")
 
@@ -45,8 +47,13 @@ def color_channels(parts: Sequence[tuple[str, Sequence[str]]]) -> ColorChannels:
     if not main:
         return _only(parts)
     if len(main) > 1 and _last(main[0]) not in BEAUTY:
-        raise NoColorError(f"has color layers {', '.join(sorted(found))}; save one of them alone")
+        raise NoColorError(f"has color layers {_listed(sorted(found))}; save one of them alone")
     return found[min(main, key=lambda layer: (*BEAUTY, _last(layer)).index(_last(layer)))]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return the names for a message of one line."""
+    return " ".join(printable(", ".join(names)).split())
 
 
 def _last(layer: str) -> str:
@@ -64,5 +71,5 @@ def _only(parts: Sequence[tuple[str, Sequence[str]]]) -> ColorChannels:
     names = [name for _, names in parts for name in names]
     others = [index for index, name in enumerate(names) if name.upper() != "A"]
     if len(parts) > 1 or len(others) != 1:
-        raise NoColorError(f"has channels {', '.join(names)} instead of R, G, B; save its colour layer alone")
+        raise NoColorError(f"has channels {_listed(names)} instead of R, G, B; save its colour layer alone")
     return ColorChannels(0, others, [index for index in range(len(names)) if index not in others])

@@ -40,14 +40,15 @@ def read_radiance(path: Path) -> NDArray[np.float32] | None:
     try:
         if not height or not width or not fits(12 * height * width, len(content)):
             raise ValueError(f"{len(content)} bytes cannot contain {width}x{height} pixels")
-        is_xyz, scale = _variables(header[1])
-        pixels = _colors(_decoded(content, size.end(), height, width))
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is rejected where it is used
+            is_xyz, scale = _variables(header[1])
+            pixels = _colors(_decoded(content, size.end(), height, width))
+            if is_xyz:
+                pixels = np.asarray(pixels @ RGB_FROM_XYZ.T, np.float32)
+            if np.any(scale != 1):
+                pixels *= scale
     except ValueError as error:
         raise SceneError(f"{path}: cannot be decoded as an image: {error}; save it again") from None
-    if is_xyz:
-        pixels = np.asarray(pixels @ RGB_FROM_XYZ.T, np.float32)
-    if np.any(scale != 1):
-        pixels *= scale
     by_axis = {size[2]: size[1], size[5]: size[4]}
     pixels = pixels if size[2] == b"Y" else pixels.transpose(1, 0, 2)
     return np.ascontiguousarray(pixels[:: -1 if by_axis[b"Y"] == b"+" else 1, :: -1 if by_axis[b"X"] == b"-" else 1])
