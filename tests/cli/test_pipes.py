@@ -125,8 +125,8 @@ def test_a_reader_that_has_gone_loses_nothing(folder: Path, to: str) -> None:
     line = [*CLRT.split(), "render", "ball.toml", *SMALL.split(), "-q", "--checkpoint", "a.ck"]
     done = subprocess.run([*line, "-o", "exr:-"], stdout=writing, stderr=subprocess.PIPE, text=True)
     os.close(writing)
-    (kept,) = folder.glob("image-*.exr")
     assert done.returncode == 6 and done.stderr.count("\n") == 1 and done.stderr.startswith("error: -: cannot be ")
+    (kept,) = folder.glob("image-*.exr")
     assert str(kept) in done.stderr and "a.ck holds the samples so far" in done.stderr
     assert subprocess.run([*line, "-o", "b.exr", "--resume"]).returncode == 0
     assert np.array_equal(read_image(kept), read_image(Path("b.exr")))
