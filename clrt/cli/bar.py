@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from .goal import Goal
-from .progress import PHASES, Progress, describe_workers, figures, where
+from .progress_reporter import PHASES, Progress, describe_workers, figures, where
 
 if TYPE_CHECKING:
     from ..rendering.renderer import State

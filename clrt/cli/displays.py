@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-from .progress import JsonProgress, PlainProgress, Progress
+from .progress_reporter import JsonProgress, PlainProgress, Progress
 
 
 def make_progress(kind: str | None, quiet: bool) -> Progress:

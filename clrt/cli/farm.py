@@ -18,7 +18,7 @@ from .goal import Goal
 from .interrupt import Interruptible
 from .option_groups import flag
 from .outputs import Outputs
-from .progress import Progress
+from .progress_reporter import Progress
 
 if TYPE_CHECKING:
     from ..farm.cluster import Cluster

@@ -21,7 +21,7 @@ from .interrupt import Interruptible
 from .load_options import LoadOptions
 from .outputs import Outputs
 from .pipes import split_pipes
-from .progress import Progress
+from .progress_reporter import Progress
 from .render_options import OutputOptions, SavingOptions, StopOptions
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import clrt
 from clrt.accel.builders import BUILDERS
 from clrt.bench.rays.build_speed import measure_builders, measure_growth
 from clrt.bench.rays.cold_start import measure_fresh
-from clrt.bench.rays.shapes import icosphere
+from clrt.bench.rays.hard_meshes import icosphere
 from clrt.bench.rays.workloads import Workload, camera_rays, closed_room
 from clrt.device.open import Device
 

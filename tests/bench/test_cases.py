@@ -20,7 +20,7 @@ from clrt.bench.numerics.families import FAMILIES, FIGURES, measure_families
 from clrt.bench.numerics.hard_light import measure_pictures
 from clrt.bench.numerics.numerics import GEOMETRY
 from clrt.bench.numerics.row import Row
-from clrt.bench.rays.shapes import icosphere
+from clrt.bench.rays.hard_meshes import icosphere
 from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight
 

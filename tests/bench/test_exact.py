@@ -8,8 +8,8 @@ import pytest
 import clrt
 from clrt.bench.numerics.aimed_rays import all_rays, rays_of_kinds
 from clrt.bench.numerics.exact_hits import UNDECIDED, closest_bounds
+from clrt.bench.rays.hard_meshes import icosphere, soup
 from clrt.bench.rays.ray_speed import Rays
-from clrt.bench.rays.shapes import icosphere, soup
 from clrt.bench.rays.workloads import Mesh
 from clrt.device.open import Device
 

@@ -9,8 +9,8 @@ import clrt
 from clrt.accel.methods import TREELESS
 from clrt.bench.numerics.aimed_rays import all_rays, rays_of_kinds
 from clrt.bench.numerics.hit_agreement import Case, Effort, measure_case
+from clrt.bench.rays.hard_meshes import icosphere, soup
 from clrt.bench.rays.ray_speed import differing
-from clrt.bench.rays.shapes import icosphere, soup
 from clrt.device.open import Device
 from clrt.queries.base import HIT
 

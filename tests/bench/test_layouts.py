@@ -7,8 +7,8 @@ import pytest
 
 import clrt
 from clrt.accel.methods import TREELESS
+from clrt.bench.rays.hard_meshes import icosphere
 from clrt.bench.rays.layout_speed import measure_layouts
-from clrt.bench.rays.shapes import icosphere
 from clrt.bench.rays.workloads import closed_room
 from clrt.device.open import Device
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 import clrt
 from clrt.bench.interleaved import Contestant, race
 from clrt.bench.rays.embree import EmbreeRays, EmbreeScene
-from clrt.bench.rays.libraries import LIBRARIES
 from clrt.bench.rays.library_speed import agreement
+from clrt.bench.rays.ray_libraries import LIBRARIES
 from clrt.bench.rays.ray_speed import Rays
 from clrt.bench.rays.workloads import bumpy_ball, closed_room
 from clrt.device.open import Device

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 import clrt
 from clrt.accel.wide import EMPTY
+from clrt.bench.rays.hard_meshes import icosphere
 from clrt.bench.rays.node_visits import visits_a_ray
 from clrt.bench.rays.ray_speed import Rays
-from clrt.bench.rays.shapes import icosphere
 from clrt.device.launches.device_arrays import DeviceArray
 from clrt.device.open import Device
 

@@ -19,7 +19,7 @@ from hypothesis import given, strategies as st
 from clrt.cli.bar import BarProgress, StatusLine, bar, columns, fitted
 from clrt.cli.displays import make_progress
 from clrt.cli.goal import Goal
-from clrt.cli.progress import PHASES, PlainProgress
+from clrt.cli.progress_reporter import PHASES, PlainProgress
 
 from .test_progress import SCENE, state
 

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from clrt.cli.goal import Goal
-from clrt.cli.progress import PlainProgress
+from clrt.cli.progress_reporter import PlainProgress
 from clrt.errors import UsageError
 from clrt.farm import worker_tasks
 from clrt.farm.banded_picture import BandedPicture

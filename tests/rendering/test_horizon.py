@@ -10,7 +10,7 @@ import pytest
 from clrt.bench.kernel_probe import Doubles, Probe
 from clrt.bench.numerics.bsdf_cases import uniform
 from clrt.bench.numerics.scattering import FITTED
-from clrt.bench.rays.shapes import icosphere
+from clrt.bench.rays.hard_meshes import icosphere
 from clrt.bench.significance import chi2_test, mean_test, rejected
 from clrt.device.open import Device
 from clrt.rendering.compile.choices import Choices

@@ -12,7 +12,7 @@ import numpy as np
 
 import clrt
 from clrt.bench.kernel_probe import Doubles
-from clrt.bench.rays.shapes import icosphere
+from clrt.bench.rays.hard_meshes import icosphere
 from clrt.scene.materials.material import Material
 from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.materials.textures import Picture, Texture

@@ -18,7 +18,7 @@ from ...scene.geometry.transform import rotation, scaling, transform_mesh, trans
 from ...scene.lights import LIGHTS, Light, SpotLight, fields_of
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
 from ...scene.model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere, Vector
-from ..rays.shapes import icosphere
+from ..rays.hard_meshes import icosphere
 from .random_draws import Draws
 
 #: Scenes per batch.

@@ -15,8 +15,8 @@ import numpy as np
 from ...rendering.renderer import Renderer
 from ...scene.model import RenderSettings
 from ..interleaved import Contestant, race
+from ..rays.hard_meshes import soup
 from ..rays.ray_speed import Rays, Run, scattered_rays
-from ..rays.shapes import soup
 from ..rays.workloads import bumpy_ball, closed_room, workloads
 from .cases.axes import measure_axes
 from .cases.departures import lit_scenes, measure_departures

@@ -13,7 +13,7 @@ import numpy as np
 from ...scene.lights import PointLight
 from ...scene.materials.material_types import Diffuse, Mirror
 from ...scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
-from ..rays.shapes import icosphere
+from ..rays.hard_meshes import icosphere
 from ..rays.workloads import Doubles
 from .cases.subject import Subject
 from .row import Row

@@ -14,8 +14,8 @@ from ...device.discovery.discover import choose, find_devices
 from ...errors import ClrtError, UsageError
 from ...queries.base import TRAVERSALS
 from ...queries.mesh import RayQuery
+from ..rays.hard_meshes import icosphere, soup
 from ..rays.ray_speed import Rays, differing, every
-from ..rays.shapes import icosphere, soup
 from ..rays.workloads import Mesh, bumpy_ball
 from .aimed_rays import all_rays, rays_of_kinds
 from .exact_hits import UNDECIDED, areas, closest_bounds

@@ -18,7 +18,7 @@ from ...errors import UsageError
 from ...queries.mesh import RayQuery
 from ..interleaved import Contestant, race
 from .embree import EmbreeRays, EmbreeScene
-from .libraries import LIBRARIES, Call, clrt
+from .ray_libraries import LIBRARIES, Call, clrt
 from .ray_speed import Floats, Run
 from .workloads import Faces, Mesh, Workload, closed_room, rotated_copies, subdivide, workloads
 

@@ -21,7 +21,7 @@ from ...scene.lights import DirectionalLight, PointLight, SpotLight
 from ...scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ...scene.materials.textures import untextured
 from ...scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
-from ..rays.shapes import icosphere
+from ..rays.hard_meshes import icosphere
 
 #: Near and far clip distances, relative to the distance of the look-at point.
 NEAR, FAR = 1e-4, 1e6

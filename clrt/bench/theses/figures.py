@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...scene.splines import smooth
-from ..rays.shapes import icosphere
+from ..rays.hard_meshes import icosphere
 from ..rays.workloads import Mesh, joined
 
 Doubles = NDArray[np.float64]

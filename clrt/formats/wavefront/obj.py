@@ -23,7 +23,7 @@ from ..polygons import ranges, triangulate
 from ..referenced_files import name_of, note_read
 from ..text_numbers import reuse_memory
 from .distinct import distinct
-from .libraries import read_libraries
+from .mtl_libraries import read_libraries
 from .obj_lines import TABLES, Block, Corners, block_ranges, read_block, without
 
 log = logging.getLogger(__name__)

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....errors import SceneError
+from ...rays.hard_meshes import soup
 from ...rays.ray_speed import scattered_rays
-from ...rays.shapes import soup
 from ...rays.workloads import Mesh, bumpy_ball
 from ..exact_hits import closest_bounds
 from ..row import Row

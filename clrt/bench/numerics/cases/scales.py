@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...rays.hard_meshes import icosphere
 from ...rays.ray_speed import scattered_rays
-from ...rays.shapes import icosphere
 from ...rays.workloads import Mesh, bumpy_ball, closed_room
 from ..aimed_rays import inside_rays
 from ..exact_hits import closest_bounds

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...rays.shapes import icosphere
+from ...rays.hard_meshes import icosphere
 from ...rays.workloads import Mesh, bumpy_ball
 from ..aimed_rays import inside_rays
 from ..row import Row

@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.bench.numerics.aimed_rays import rays_of_kinds
+from clrt.bench.rays.hard_meshes import icosphere, soup
 from clrt.bench.rays.ray_speed import Floats
 from clrt.bench.rays.resize import SIMPLE, resized, simplified
-from clrt.bench.rays.shapes import icosphere, soup
 from clrt.bench.rays.workloads import Faces, bumpy_ball
 
 
