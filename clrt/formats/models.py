@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,6 @@ from ..errors import SceneError
 from ..file_names import StrPath
 from ..scene.geometry.instancing import baked
 from ..scene.geometry.normals import Normals, choose_normals
-from ..scene.materials.material import BELOW_ONE
 from ..scene.materials.material_types import Diffuse
 from ..scene.model import Mesh, Model
 from ..scene.validation.validate import mesh_problems
@@ -145,8 +143,6 @@ def _mesh(path: Path, name: str, piece: dict[str, Any], normals: Normals) -> Mes
     if uv is None and material.textures():
         log.warning('%s: mesh "%s" has no texture coordinates; the textures of its material are ignored', path, name)
         material = material.without_textures()
-    if colors is not None and colors.shape[1] == 4 and material.opacity == 1:
-        material = replace(material, opacity=BELOW_ONE)
     mesh = Mesh(
         vertices,
         piece["faces"],

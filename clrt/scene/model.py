@@ -38,7 +38,7 @@ class Mesh:
     - normals: (n, 3) float32, interpolated over each face, or None for flat shading.
     - uv, uv1: (n, 2) float32, the two sets of texture coordinates (see `Texture`).
     - colors: (n, 3) or (n, 4) float32, linear, from 0 to 1; they multiply the material's color, and the fourth
-      component its opacity unless that is 1.
+      component its opacity.
     - tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing.
     - material_name: the material's name in the model file.
     """

@@ -238,11 +238,14 @@ def test_vertex_colors_multiply_the_color() -> None:
         np.eye(3, dtype=np.float32),
         np.array([[0, 1, 2]], np.int32),
         colors=np.full((3, 4), 0.5, np.float32),
-        material=MetallicRoughness(color=(1, 0.5, 0.25)),
+        material=MetallicRoughness(color=(1, 0.5, 0.25), opacity=0.8),
     )
     told = mitsuba_scene(Scene(meshes=[mesh]))["mesh0"]
-    assert told["bsdf"]["front"]["color"] == {"type": "mesh_attribute", "name": "vertex_color"}
+    mask = told["bsdf"]
+    assert mask["bsdf"]["front"]["color"] == {"type": "mesh_attribute", "name": "vertex_color"}
+    assert mask["opacity"] == {"type": "mesh_attribute", "name": "vertex_opacity"}
     np.testing.assert_allclose(told["colors"], [[0.5, 0.25, 0.125]] * 3)
+    np.testing.assert_allclose(told["opacity"], [0.4] * 3)
     with pytest.raises(UsageError, match="vertex colors with a texture"):
         mitsuba_scene(Scene(meshes=[replace(mesh, material=Diffuse(color=Texture(picture=PICTURE)))]))
 

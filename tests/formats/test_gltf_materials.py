@@ -280,17 +280,17 @@ def test_glass_beside_metal_in_one_picture(tmp_path: Path, wrap: int, name: str)
         assert is_glass == (factor == 0 or where[name](middle) > 0.5), (middle, factor)
 
 
-@pytest.mark.parametrize("mode, fades, cutoff", [("OPAQUE", False, None), ("BLEND", True, None), ("MASK", True, 1.0)])
-def test_alpha_of_vertex_colors(tmp_path: Path, mode: str, fades: bool, cutoff: float | None) -> None:
-    """It multiplies the opacity, also one of 1, but not that of opaque materials."""
+@pytest.mark.parametrize("mode, channels, cutoff", [("OPAQUE", 3, None), ("BLEND", 4, None), ("MASK", 4, 1.0)])
+def test_alpha_of_vertex_colors(tmp_path: Path, mode: str, channels: int, cutoff: float | None) -> None:
+    """It is kept except on opaque materials."""
     gltf = ball()
     gltf.document["materials"] = [{"alphaMode": mode, "alphaCutoff": 1.0}]
     primitive = gltf.document["meshes"][0]["primitives"][0]
     primitive["material"] = 0
     primitive["attributes"]["COLOR_0"] = gltf.accessor(np.full((len(icosphere(0)[0]), 4), 0.5))
-    material = read(gltf, tmp_path).meshes[0].material
-    assert (material.opacity != 1) == fades and material.opacity == pytest.approx(1)
-    assert material.alpha_cutoff == (None if cutoff is None else material.opacity)
+    mesh = read(gltf, tmp_path).meshes[0]
+    assert mesh.colors is not None and mesh.colors.shape[1] == channels
+    assert mesh.material.opacity == 1 and mesh.material.alpha_cutoff == cutoff
 
 
 def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

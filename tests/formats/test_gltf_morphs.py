@@ -67,6 +67,8 @@ def test_texture_coordinates_colors_and_tangents(tmp_path: Path) -> None:
         | {key: gltf.accessor(values) for key, values in stored.items()},
         targets=[{key: gltf.accessor(values) for key, values in moves.items()}],
     )
+    gltf.document["materials"] = [{"alphaMode": "BLEND"}]
+    gltf.document["meshes"][0]["primitives"][0]["material"] = 0
     gltf.document["meshes"][0]["weights"] = [0.5]
     (mesh,) = read(gltf, tmp_path).meshes
     for name, key in [("uv", "TEXCOORD_0"), ("uv1", "TEXCOORD_1"), ("colors", "COLOR_0")]:

@@ -46,6 +46,8 @@ class Paths:
         self._delta_lights = delta_lights(scene)
         transparent = [each.opacity != 1 or each.one_sided for each in self.geometry.materials]
         self._transparent = np.array(transparent, bool)[self.geometry.material]
+        triangles = len(self.geometry.colors)
+        self._transparent[:triangles] |= (self.geometry.colors[:, :, 3] < 1).any(axis=1)
 
     def samples(self, spp: int, rng: np.random.Generator) -> Doubles:
         """Return samples (h, w, spp, 3), uniform over each pixel."""

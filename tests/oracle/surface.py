@@ -55,11 +55,8 @@ class Surface:
         return self.color(value) * self.tint[:, :3]
 
     def opacity(self, material: Material) -> Doubles:
-        """Return the share of light that a material stops, (n,). Vertex alpha applies to
-        materials with an opacity below 1.
-        """
-        alpha = self.tint[:, 3] if material.opacity != 1 else np.ones(len(self.p))
-        opacity = self.number(material.opacity) * alpha
+        """Return the share of light that a material stops, (n,)."""
+        opacity = self.number(material.opacity) * self.tint[:, 3]
         if material.alpha_cutoff is not None:
             opacity = (opacity >= material.alpha_cutoff).astype(float)
         return np.where(self.front | (not material.one_sided), opacity, 0.0)

@@ -66,7 +66,9 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
         plugin = plugin if "TRANSMISSION" in material.features() else {"type": "twosided", "front": plugin}
         if material.one_sided:
             raise ValueError("one-sided surfaces")
-        if material.opacity != 1:
+        if isinstance(owner, Mesh) and owner.colors is not None and owner.colors.shape[1] == 4:
+            plugin = {"type": "mask", "opacity": _vertex_opacity(material), "bsdf": plugin}
+        elif material.opacity != 1:
             plugin = {"type": "mask", "opacity": _opacity(material), "bsdf": plugin}
     except ValueError as error:
         raise UsageError(f"{owner.name}: Mitsuba does not support {error}") from None
@@ -137,6 +139,13 @@ def _bend(texture: Texture) -> Plugin:
     xyz = _channels(texture, "red", "green", "blue")
     xyz[..., :2] = 0.5 + (xyz[..., :2] - 0.5) @ axes * np.max(texture.factor)
     return _bitmap(texture, xyz)
+
+
+def _vertex_opacity(material: Material) -> Plugin:
+    """Return the opacity of vertex colors, which `mitsuba_scene` multiplies by the material's."""
+    if isinstance(material.opacity, Texture) or material.alpha_cutoff is not None:
+        raise ValueError("vertex colors with alpha and a texture or a cutoff")
+    return {"type": "mesh_attribute", "name": "vertex_opacity"}
 
 
 def _bitmap(texture: Texture, texels: Any) -> Plugin:

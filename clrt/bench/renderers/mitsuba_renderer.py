@@ -96,7 +96,15 @@ def _native(library: Any, value: Any) -> Any:
 
 
 def _mesh(
-    library: Any, *, vertices: Any, faces: Any, normals: Any, uv: Any = None, colors: Any = None, **plugins: Any
+    library: Any,
+    *,
+    vertices: Any,
+    faces: Any,
+    normals: Any,
+    uv: Any = None,
+    colors: Any = None,
+    opacity: Any = None,
+    **plugins: Any,
 ) -> Any:
     """Return a mesh with its BSDF and emitter; flat-shaded if it has no normals."""
     properties = library.Properties()
@@ -113,6 +121,8 @@ def _mesh(
     )
     if colors is not None:
         mesh.add_attribute("vertex_color", 3, colors.ravel())
+    if opacity is not None:
+        mesh.add_attribute("vertex_opacity", 1, opacity)
     arrays = library.traverse(mesh)
     arrays["vertex_positions"], arrays["faces"] = vertices.ravel(), faces.ravel()
     if normals is not None:

@@ -26,7 +26,7 @@ _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 def mesh_glb(mesh: Mesh) -> bytes:
-    """Return the content of the .glb file. The mesh's material is not written."""
+    """Return the content of the .glb file. Of the mesh's material only the alpha mode is written."""
     views: list[dict[str, Any]] = []
     accessors: list[dict[str, Any]] = []
     binary = b""
@@ -54,6 +54,9 @@ def mesh_glb(mesh: Mesh) -> bytes:
         for name, array in arrays.items()
     }
     primitive = {"attributes": attributes, "indices": add(mesh.faces.astype("<u4").ravel(), _UINT)}
+    has_alpha = mesh.colors is not None and mesh.colors.shape[1] == 4
+    if has_alpha:
+        primitive["material"] = 0
     document = {
         "asset": {"version": "2.0", "generator": "clrt"},
         "scene": 0,
@@ -63,6 +66,7 @@ def mesh_glb(mesh: Mesh) -> bytes:
         "buffers": [{"byteLength": len(binary)}],
         "bufferViews": views,
         "accessors": accessors,
+        **({"materials": [{"alphaMode": "BLEND"}]} if has_alpha else {}),
     }
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...scene.materials.material import BELOW_ONE
 from ...scene.materials.material_types import Diffuse, Material, MetallicRoughness
 from ...scene.materials.textures import Channel, Picture, Texture, Wrap
 from ..images.image_reader import read_texels
@@ -61,28 +60,31 @@ class Materials:
         uv: list[NDArray[np.float32] | None],
         faces: NDArray[np.int32],
         colors: NDArray[np.float32] | None,
-    ) -> list[tuple[Material, NDArray[np.int32]]]:
+    ) -> list[tuple[Material, NDArray[np.int32], NDArray[np.float32] | None]]:
         """Return the primitive's material with all values clamped to their limits, or the specification's default if it
-        has none, and the faces that it is on: those of solid glass have one of their own. uv, faces, colors: the
-        primitive's texture coordinates, both sets, triangles and vertex colors.
+        has none, the faces that it is on (those of solid glass have one of their own), and its vertex colors, with
+        alpha if that counts. uv, faces, colors: the primitive's texture coordinates, both sets, triangles and vertex
+        colors.
 
         A texture is replaced by white if the primitive has no coordinates for it or if it cannot be read; a base color
         texture by grey, an emission texture by black.
         """
         index = self._index(primitive)
+        opaque = None if colors is None else colors[:, :3]
         if index is None:
-            return [(MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0), faces)]
+            return [(MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0), faces, opaque)]
         source = converted(gltf.entry(self._data.document.materials, index, "material", user))
         pbr, extensions = source.pbrMetallicRoughness, source.extensions
         base = self._texture(pbr.baseColorTexture, primitive, user)
-        coverage = _coverage(source, base, "COLOR_0" in primitive.attributes)
+        coverage = _coverage(source, base)
+        colors = colors if coverage else opaque
         color = _colored(_cut(pbr.baseColorFactor[:3]), base, pbr.baseColorTexture, GREY)
         if extensions.KHR_materials_unlit is not None:
             self._note(
                 index,
                 {"the variation of vertex colors": colors is not None and bool(np.ptp(colors[:, :3], axis=0).any())},
             )
-            return [(_unlit(color, colors, coverage), faces)]
+            return [(_unlit(color, colors, coverage), faces, colors)]
         made = MetallicRoughness(
             color=color,
             emission=self._emission(source, primitive, user),
@@ -92,15 +94,15 @@ class Materials:
         )
         made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
         solid = solid_faces(extensions, made, uv, faces)
-        parts: list[tuple[Material, NDArray[np.int32]]] = []
+        parts: list[tuple[Material, NDArray[np.int32], NDArray[np.float32] | None]] = []
         if not solid.all():
-            parts.append((replace(tinted(extensions, made), **coverage), faces[~solid]))
+            parts.append((replace(tinted(extensions, made), **coverage), faces[~solid], colors))
             volume = extensions.KHR_materials_volume.thicknessFactor > 0
             self._note(index, {"volume": volume and made.transmission != 0 and made.metallic != 1})
         if solid.any():
-            parts.append((glass(extensions, made), faces[solid]))
+            parts.append((glass(extensions, made), faces[solid], opaque))
             layers = {layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR")}
-            self._note(index, {"alphaMode": coverage.get("opacity", 1.0) != 1, **layers})
+            self._note(index, {"alphaMode": coverage.get("opacity", 1.0) != 1 or colors is not opaque, **layers})
         return parts
 
     def _note(self, index: int, lost: Mapping[str, bool]) -> None:
@@ -239,18 +241,16 @@ def _turned(picture: Picture, scale: float) -> Picture:
     return Picture(texels, picture.name)
 
 
-def _coverage(source: looks.Material, base: Texture | None, vertex_colors: bool) -> dict[str, Any]:
-    """Return opacity and alpha_cutoff of the material's alpha mode."""
+def _coverage(source: looks.Material, base: Texture | None) -> dict[str, Any]:
+    """Return opacity and alpha_cutoff of the material's alpha mode, none if it is opaque."""
     if source.alphaMode == "OPAQUE":
         return {}
     opacity = _numbered(_unit(source.pbrMetallicRoughness.baseColorFactor[3]), base, "alpha")
-    most = BELOW_ONE if opacity == 1 and vertex_colors else 1.0
-    opacity = most if opacity == 1 else opacity
     if source.alphaMode == "BLEND":
         return {"opacity": opacity}
     if source.alphaCutoff > 1:  # no alpha reaches it (specification 3.9.4)
         return {"opacity": 0.0}
-    return {"opacity": opacity, "alpha_cutoff": most * _unit(source.alphaCutoff)}
+    return {"opacity": opacity, "alpha_cutoff": _unit(source.alphaCutoff)}
 
 
 def _colored(

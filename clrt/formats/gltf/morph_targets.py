@@ -38,10 +38,14 @@ def morphed(
     moved = values.astype(np.float64)
     for weight, target in zip(weights, primitive.targets):
         if weight and key in target:
-            moves = data.array(target[key], VECTORS[size], f"{user}, morph target")
+            kind = VECTORS[size]
+            if key == "COLOR_0":  # the alpha of either may be missing
+                found = gltf.entry(data.document.accessors, target[key], "accessor", user).type
+                kind = "VEC3" if found == "VEC3" else "VEC4"
+            moves = data.array(target[key], kind, f"{user}, morph target")[:, :size]
             if len(moves) != len(values):
                 raise SceneError(
                     f"{user}: a morph target has {len(moves)} of {key} for {len(values)} vertices; export it again"
                 )
-            moved[:, :size] += weight * np.where(np.isfinite(moves), moves, 0)
+            moved[:, : moves.shape[1]] += weight * np.where(np.isfinite(moves), moves, 0)
     return moved.astype(np.float32)

@@ -100,7 +100,8 @@ def _stored(data: GltfData, materials: Materials, index: int) -> Iterator[Stored
         )
         colors = _colors(data, primitive, len(vertices), where)
         influences = read_influences(data, primitive, len(vertices), where)
-        for material, faces in materials.materials(primitive, where, [uv, uv1], corners.astype(np.int32), colors):
+        for part in materials.materials(primitive, where, [uv, uv1], corners.astype(np.int32), colors):
+            material, faces, part_colors = part
             mesh = Mesh(
                 vertices,
                 faces,
@@ -109,7 +110,7 @@ def _stored(data: GltfData, materials: Materials, index: int) -> Iterator[Stored
                 name,
                 uv=uv,
                 uv1=uv1,
-                colors=colors,
+                colors=part_colors,
                 tangents=tangent,
                 material_name=materials.name(primitive),
             )

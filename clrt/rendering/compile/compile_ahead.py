@@ -23,6 +23,7 @@ from ...errors import ClrtError
 from ...scene.model import Mesh, Scene
 from ...threads import beside
 from .choices import Choices
+from .materials.vertex_alpha import with_vertex_alpha
 
 #: Approximate factor by which packing enlarges a scene in memory; and the maximum number of primitives in an outline.
 PACKED, MOST = 3, 1000
@@ -37,7 +38,7 @@ def begin_program(scene: Scene, choices: Choices, device: Device, source: Callab
     in_tree = spheres if spheres > FEW_SPHERES else 0
     layout = choices.layout or fitting_layout(device, count, in_tree, choices.tests.triangle, False, choices.tree)
     with suppress(ClrtError):  # errors are reported by the regular compilation
-        outlined = outline(scene)
+        outlined = outline(with_vertex_alpha(scene))
         builder = builder_source(device, layout, choices.builder, count, in_tree)
         if (
             builder is None

@@ -27,6 +27,7 @@ from .lights.environment_map import EnvironmentMap
 from .lights.pack_lights import PackedLights, pack_emitters
 from .materials.pack_materials import MaterialTables, PackedMaterials, pack_materials
 from .materials.pack_textures import PackedTextures
+from .materials.vertex_alpha import with_vertex_alpha
 from .pixel_filters import filter_quantiles
 from .records import COUNTS
 from .reuse_cache import ReuseCache
@@ -40,7 +41,7 @@ class Shapes:
     """
 
     def __init__(self, scene: Scene) -> None:
-        scene, *of_objects = arranged(scene)
+        scene, *of_objects = arranged(with_vertex_alpha(scene))
         self.frame = frame_of(scene)
         scene = in_frame(scene, self.frame)
         self.objects = ObjectIds([len(mesh.faces) for mesh in scene.meshes], len(scene.spheres), *of_objects)

@@ -20,8 +20,6 @@ Parameter = float | tuple[float, ...] | Texture
 
 #: Below this alpha GGX exceeds float32 (D ~ 1/(pi alpha²)), also in the kernel; use `Mirror` for perfect reflection.
 ALPHA_MIN = 1e-4
-#: Opacity of surfaces whose vertex colors have alpha, which would be ignored with an opacity of 1.
-BELOW_ONE = 1 - 2.0**-24
 
 
 @dataclass(frozen=True, kw_only=True)
