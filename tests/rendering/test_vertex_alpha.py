@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clrt.rendering.compile.materials.vertex_alpha import with_vertex_alpha
+from clrt.rendering.compile.materials.vertex_alpha import BELOW_ONE, with_vertex_alpha
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Instance, Mesh, Scene
 
@@ -32,9 +32,9 @@ def test_opacity_of_meshes_and_instances() -> None:
     )
     found = with_vertex_alpha(scene)
     first, second, third, fourth = found.meshes
-    assert 1 - 1e-6 < first.material.opacity < 1 and second is solid
-    assert third.material is veil and fourth.material.opacity < 1
-    assert fourth.material.alpha_cutoff == 0.5 * fourth.material.opacity
+    assert first.material.opacity == BELOW_ONE and second is solid
+    assert third.material is veil and fourth.material.opacity == BELOW_ONE
+    assert fourth.material.alpha_cutoff == 0.5 * BELOW_ONE
     assert [each.mesh is first for each in found.instances] == [True, True, True, False]
     assert [each.material for each in found.instances] == [None, veil, first.material, None]
     assert found.instances[2].material is first.material and found.instances[3] is scene.instances[3]

@@ -11,7 +11,7 @@ from clrt.scene.geometry.creases import MOST_AROUND, creased
 from clrt.scene.geometry.normals import smooth_normals
 from clrt.scene.model import Mesh
 
-from .hard_meshes import cube, icosphere
+from .shapes import cube, icosphere
 
 EPS = float(np.finfo(np.float32).eps)
 

@@ -5,7 +5,7 @@ import pytest
 
 from clrt.scene.geometry.normals import choose_normals, smooth_normals, weld
 
-from .hard_meshes import cube, icosphere
+from .shapes import cube, icosphere
 
 EPS = float(np.finfo(np.float32).eps)
 

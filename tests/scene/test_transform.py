@@ -15,7 +15,7 @@ from clrt.scene.geometry.transform import (
 )
 from clrt.scene.model import Camera, Mesh
 
-from .hard_meshes import icosphere, volume
+from .shapes import icosphere, volume
 
 EPS = float(np.finfo(np.float32).eps)
 

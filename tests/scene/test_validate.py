@@ -13,7 +13,7 @@ from clrt.scene.materials.material_types import Diffuse, MetallicRoughness
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.validation.validate import validate
 
-from .hard_meshes import icosphere
+from .shapes import icosphere
 
 
 def good_scene() -> Scene:
