@@ -3,10 +3,8 @@
 //
 // - SLAB_PAD, of t = (plane − origin)·(1/direction): three roundings, a relative error below 3 u; it is twice that.
 // - BOX_PAD, of t = plane·inverse + shift: the division adds 1 u of t, the sum 1 u of t, and the product in `shift` 1 u
-// of
-//   |shift|; it is 4 u of t and 4 u of |shift|.
-// - STEEPEST: beyond it t is wrong, but by the same amount for all planes of the axis, so only the side of them on
-// which
+//   of |shift|; it is 4 u of t and 4 u of |shift|.
+// - STEEPEST: beyond it t is wrong, but by the same amount for all planes of the axis, so only the side of them on which
 //   the origin lies matters. SIDE pads that by 1e-8 lengths, so that an origin on a plane is on its inner side.
 // - ORIGIN_PAD, of p − origin in compressed nodes: see traverse/cwbvh.cl.
 
