@@ -35,13 +35,22 @@ class TextureSource(Part):
 
 
 class TextureExtensions(Part):
+    EXT_texture_avif: TextureSource | None = None
     EXT_texture_webp: TextureSource | None = None
+    KHR_texture_basisu: TextureSource | None = None
 
 
 class Texture(Part):
     source: Index | None = None
     sampler: Index | None = None
     extensions: TextureExtensions = TextureExtensions()
+
+    @property
+    def sources(self) -> tuple[int, ...]:
+        """The images to choose from, the one to prefer first: Basis Universal loses most, and needs a decoder."""
+        more, own = self.extensions, None if self.source is None else TextureSource(source=self.source)
+        found = (more.EXT_texture_webp, more.EXT_texture_avif, own, more.KHR_texture_basisu)
+        return tuple(each.source for each in found if each is not None)
 
 
 class TextureTransform(Part):

@@ -37,10 +37,13 @@ class Materials:
     def __init__(self, data: GltfData, variant: int | None = None) -> None:
         self._data, self._variant = data, variant
         self._names = gltf.unique_names("material", [material.name for material in data.document.materials])
-        self._pictures: dict[int, Picture | None] = {}
+        self._pictures: dict[int, Picture] = {}
+        self._chosen: dict[tuple[int, ...], Picture | None] = {}
         self._derived: dict[tuple[int, float], Picture] = {}
         #: Features that had an effect in the file, but are not rendered, by the material's name.
         self.unused: dict[str, list[str]] = {}
+        #: Textures that could not be read, and why; a warning was logged for each.
+        self.unread: list[str] = []
 
     def name(self, primitive: gltf.Primitive) -> str:
         """Return the name of the primitive's material, empty if it has none."""
@@ -185,9 +188,7 @@ class Materials:
         if uv_set > 1 or f"TEXCOORD_{uv_set}" not in primitive.attributes:
             log.warning("%s: %s has no texture coordinates %d; its texture is left out", self._data.path, user, uv_set)
             return None
-        webp = texture.extensions.EXT_texture_webp
-        source = texture.source if webp is None else webp.source
-        picture = None if source is None else self._picture(source, f"texture {info.index}")
+        picture = self._first_picture(texture.sources, f"texture {info.index}")
         if picture is None:
             return None
         sampler = looks.Sampler()
@@ -204,20 +205,31 @@ class Materials:
             filter="nearest" if sampler.magFilter == NEAREST else "linear",
         )
 
-    def _picture(self, index: int, user: str) -> Picture | None:
-        """Return an image; None, with a warning, if it cannot be read."""
+    def _first_picture(self, sources: tuple[int, ...], user: str) -> Picture | None:
+        """Return the first of these images that can be read; None, with a warning, if none can."""
+        if not sources or sources in self._chosen:
+            return self._chosen.get(sources)
+        faults = list[str]()
+        self._chosen[sources] = None
+        for index in sources:
+            try:
+                self._chosen[sources] = self._picture(index, user)
+                return self._chosen[sources]
+            except SceneError as error:
+                faults.append(str(error))
+        self.unread.append(f"a texture: {'; '.join(faults)}")
+        log.warning("%s: a texture is left out: %s", self._data.path, "; ".join(faults))
+        return None
+
+    def _picture(self, index: int, user: str) -> Picture:
         if index not in self._pictures:
             image = gltf.entry(self._data.document.images, index, "image", user)
-            try:
-                content = (
-                    self._data.resource(image.uri or "", user)
-                    if image.bufferView is None
-                    else self._data.view(image.bufferView, user).tobytes()
-                )
-                self._pictures[index] = Picture(read_texels(content, f"image {index}"), image.name or f"image {index}")
-            except SceneError as error:
-                log.warning("%s: a texture is left out: %s", self._data.path, error)
-                self._pictures[index] = None
+            content = (
+                self._data.resource(image.uri or "", user)
+                if image.bufferView is None
+                else self._data.view(image.bufferView, user).tobytes()
+            )
+            self._pictures[index] = Picture(read_texels(content, f"image {index}"), image.name or f"image {index}")
         return self._pictures[index]
 
 
