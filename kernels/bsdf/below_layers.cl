@@ -37,6 +37,12 @@ static inline void take(const struct metallic_roughness *m, LayerEntry entry, Le
     left->taken_f0 = maximum(film * entry.part[0] + fibres * entry.part[2] - both * entry.part[4], ZERO);
     left->taken_f90 = maximum(film * entry.part[1] + fibres * entry.part[3] - both * entry.part[5], ZERO);
     left->taken_fibres = film * entry.part[6];
+#if ANISOTROPY
+    // The tables are those of isotropic surfaces: what min removes from anisotropic gloss is lost.
+    ireal lost = is_anisotropic(&m->anisotropy);
+    left->taken_f0 = lost ? ZERO : left->taken_f0;
+    left->taken_f90 = lost ? ZERO : left->taken_f90;
+#endif
 }
 #endif
 

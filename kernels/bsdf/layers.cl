@@ -149,14 +149,14 @@ static inline BsdfValue layers_reflected(const struct metallic_roughness *m, rea
 static inline BsdfValue layers_transmitted(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), mirrored = vector(base_i.x, base_i.y, -base_i.z);
     real3 sum = add(base_o, mirrored);
-    real facets = ggx_d(normalize3(sum), m->alpha) / (4.0f * base_o.z);
+    real facets = ggx_d(SQUEEZED(m, normalize3(sum)), m->alpha) / (4.0f * base_o.z);
     real3 on = passed_on(m, 0.5f * length3(sum));
     Left left = left_at(m, mirrored.z, -IN_COAT(m, wi).z);
-    real seen = facets * smith_shadowing(base_o, mirrored, m->alpha, m->smith);
+    real seen = facets * smith_shadowing(STRETCHED(m, base_o), STRETCHED(m, mirrored), m->alpha, m->smith);
     real3 value = scale(on, seen * minimum(m->left.body, left.body));
-    real pdf = m->layers.through * facets / (1.0f + ggx_lambda(base_o, m->alpha));
+    real pdf = m->layers.through * facets / (1.0f + ggx_lambda(STRETCHED(m, base_o), m->alpha));
 #if SCATTERS
-    real lost = m->lost_o * ggx_bounce(&m->bounces, mirrored.z).lost * mirrored.z * (1.0f / PI);
+    real lost = m->lost_o * BOUNCE_AT(m, mirrored).lost * mirrored.z * (1.0f / PI);
     value = mad3(m->scattered, lost * m->left.body * left.body * m->scattered_scale, value);
     pdf += m->layers.scattered * multiple_pdf(m, mirrored.z);
 #endif
@@ -212,7 +212,10 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
     BsdfSample sample = base_sample(m, base_o, u, is_base ? minimum((lobe - below) / share.base, BELOW_ONE) : ZERO);
     ireal through = NO_LANES;
 #if THROUGH
-    real3 h = sample_visible_normal(base_o, m->alpha, u);
+    real3 h = sample_visible_normal(STRETCHED(m, base_o), m->alpha, u);
+#if ANISOTROPY
+    h = normalize3(STRETCHED(m, h));
+#endif
     real3 mirrored = sub(scale(h, 2.0f * dot3(base_o, h)), base_o);
     through = !is_base & (lobe >= below - share.through);
 #if SCATTERS

@@ -16,6 +16,7 @@
 // form one lobe,
 //   r(wi)·r(wo)/(pi·mean r), r(c) = albedo·(1 − E(c)) + multiple·lost(c)
 //
+// ANISOTROPY: two roughnesses along axes on the surface (anisotropy.cl).
 // SPECULAR: f0 of the dielectric part times specular·specular_color; F ends at `specular` (glTF's
 // KHR_materials_specular).
 // LAYERS: layers on top, and transmission (layers.cl).
@@ -24,6 +25,23 @@
 #include "bsdf/interface.cl"
 #include GGX_ALBEDO_FILE
 #include SHEEN_FILE
+#include ANISOTROPY_FILE
+#include ANISOTROPY_ALBEDO_FILE
+
+#if ANISOTROPY
+#define STRETCHED(m, w) stretched_by(&m->anisotropy, w)
+#define SQUEEZED(m, h) squeezed_by(&m->anisotropy, h)
+#define WIDEST_ALPHA(m) m->anisotropy.alpha_t
+#else
+#define STRETCHED(m, w) w
+#define SQUEEZED(m, h) h
+#define WIDEST_ALPHA(m) m->alpha
+#endif
+#if ANISOTROPY_ALBEDO
+#define BOUNCE_AT(m, w) bounce_at(&m->anisotropy, &m->bounces, w)
+#else
+#define BOUNCE_AT(m, w) ggx_bounce(&m->bounces, w.z)
+#endif
 
 #if LAYERS
 #define BASE(name) base_##name
@@ -57,6 +75,9 @@ struct metallic_roughness {
     real alpha;
     ireal smith, coupling;
     LobeShares shares;
+#if ANISOTROPY
+    Anisotropy anisotropy;      // alpha: √(alpha_t·alpha_b)
+#endif
 #if COUPLING_ALBEDO
     real3 left_o;               // r(wo)/mean r; below layers R(wo)/mean R
 #endif
@@ -127,12 +148,12 @@ static inline real3 left_albedo(const struct metallic_roughness *m, Bounce bounc
 // Sample around +z with a density proportional to 1/(cos² + alpha²) in cos²: pdf = cos/(pi·spread·(cos² + alpha²)),
 // spread = log(1 + 1/alpha²).
 static inline real3 sample_multiple(const struct metallic_roughness *m, real2 u) {
-    real s, c, z2 = minimum(m->alpha * m->alpha * (exp(u.x * m->spread) - 1.0f), ONE), r = sqrt(1.0f - z2);
+    real s, c, z2 = minimum(WIDEST_ALPHA(m) * WIDEST_ALPHA(m) * (exp(u.x * m->spread) - 1.0f), ONE), r = sqrt(1.0f - z2);
     sincos_turns(u.y, &s, &c);
     return vector(r * c, r * s, sqrt(z2));
 }
 static inline real multiple_pdf(const struct metallic_roughness *m, real cos_theta) {
-    return cos_theta / (PI * m->spread * (cos_theta * cos_theta + m->alpha * m->alpha));
+    return cos_theta / (PI * m->spread * (cos_theta * cos_theta + WIDEST_ALPHA(m) * WIDEST_ALPHA(m)));
 }
 #endif
 
@@ -196,6 +217,21 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.base_frame = frame_around(to_local(frame, surface->ns));
     m.coat_frame = frame_around(to_local(frame, surface->coat_normal));
 #endif
+#if ANISOTROPY
+    ireal has_tangents;
+    real3 axis = anisotropic_axis(scene, index, surface, &has_tangents), towards = surface->towards;
+#if COAT_NORMALS
+    axis = to_local(m.base_frame, to_local(frame, axis));
+    towards = to_local(m.base_frame, to_local(frame, towards));
+#else
+    Frame frame = frame_around(surface->ns);
+    axis = to_local(frame, axis);
+    towards = to_local(frame, towards);
+#endif
+    real strength = has_tangents ? PARAMETER(metallic_roughness, anisotropy) : ZERO;
+    m.anisotropy = anisotropy_of(scene, index, m.alpha, strength, axis);
+    m.alpha = sqrt(m.anisotropy.alpha_t * m.anisotropy.alpha_b);
+#endif
 #if SHEEN
     m.sheen = PARAMETER3(metallic_roughness, sheen_color);
     m.fibres = fibres_of(PARAMETER(metallic_roughness, sheen_roughness));
@@ -222,6 +258,10 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
 #endif
 #if GGX_ALBEDO
     m.bounces = bounces_of(m.alpha, m.smith);
+#if ANISOTROPY_ALBEDO
+    ireal anisotropic = is_anisotropic(&m.anisotropy);
+    if (ANY(anisotropic)) m.bounces.mean = choose_bounce(anisotropic, anisotropic_mean(&m.anisotropy), m.bounces.mean);
+#endif
 #endif
 #if MULTIPLE_SCATTERING
     real lost = m.bounces.mean.lost;
@@ -230,14 +270,22 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     real3 kept = sub(splat(ONE), scale(f, lost));
     real part = PARAMETER(metallic_roughness, multiple) * (BY_ALBEDO(&m) ? metallic : ONE) * (1.0f - lost);
     m.multiple = scale(vector(f.x * f.x / kept.x, f.y * f.y / kept.y, f.z * f.z / kept.z), part);
+#if ANISOTROPY
+    m.spread = log(1.0f + 1.0f / square(m.anisotropy.alpha_t));
+#else
     m.spread = log(1.0f + 1.0f / square(m.alpha));
+#endif
 #endif
     real cos_o = maximum(surface->cos_o, ZERO);
     real3 fresnel_o = base_fresnel(&m, cos_o);
     real specular_o = luminance(fresnel_o), multiple_o = ZERO;
     real diffuse_o = luminance(mul(sub(splat(ONE), fresnel_o), m.albedo));
 #if GGX_ALBEDO
+#if ANISOTROPY_ALBEDO
+    Bounce bounce_o = bounce_at(&m.anisotropy, &m.bounces, vector(towards.x, towards.y, cos_o));
+#else
     Bounce bounce_o = ggx_bounce(&m.bounces, cos_o);
+#endif
     specular_o = m.coupling == 0 ? luminance(bounce_albedo(m.f0, F90(&m), bounce_o)) : specular_o;
 #endif
 #if MULTIPLE_SCATTERING

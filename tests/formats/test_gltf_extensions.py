@@ -313,3 +313,26 @@ def test_another_image_replaces_a_damaged_one(tmp_path: Path, caplog: pytest.Log
     color = textured(gltf, {"source": png, "extensions": {"EXT_texture_webp": {"source": 1}}}, tmp_path)
     assert isinstance(color, Texture) and not caplog.text
     np.testing.assert_array_equal(color.picture.texels[..., :3], TEXELS)
+
+
+def test_anisotropy(tmp_path: Path) -> None:
+    """The strength is blue times the factor, the direction red and green; the rotation is in radians."""
+    gltf = Gltf()
+    source = {"anisotropyStrength": 0.5, "anisotropyRotation": np.pi / 6, "anisotropyTexture": image(gltf, TEXELS)}
+    material = {"extensions": {"KHR_materials_anisotropy": source}}
+    (mesh,) = with_uv(tmp_path, gltf, material, np.zeros((1, 3, 2)))
+    made = mesh.material
+    assert isinstance(made, MetallicRoughness) and made.anisotropy_degrees == pytest.approx(30)
+    assert isinstance(made.anisotropy, Texture) and (made.anisotropy.channel, made.anisotropy.factor) == ("blue", 0.5)
+    assert made.anisotropy_map is not None and made.anisotropy_map.picture is made.anisotropy.picture
+    plain = with_uv(
+        tmp_path, Gltf(), {"extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 2}}}, [[[0, 0]] * 3]
+    )
+    assert isinstance(plain[0].material, MetallicRoughness) and plain[0].material.anisotropy == 1
+
+
+def test_anisotropy_without_a_direction(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Primitives without tangents and texture coordinates are isotropic, with a message."""
+    made = of(tmp_path, {"name": "brushed", "extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 1}}})
+    assert isinstance(made, MetallicRoughness) and made.anisotropy == 0
+    assert caplog.messages[0].endswith('left out: anisotropy of material "brushed"')

@@ -86,6 +86,12 @@ class EmissiveStrength(Part):
     emissiveStrength: float = 1.0
 
 
+class Anisotropy(Part):
+    anisotropyStrength: float = 0.0
+    anisotropyRotation: float = 0.0
+    anisotropyTexture: TextureInfo | None = None
+
+
 class Clearcoat(Part):
     clearcoatFactor: float = 0.0
     clearcoatTexture: TextureInfo | None = None
@@ -136,6 +142,7 @@ class Unlit(Part):
 
 
 class MaterialExtensions(Part):
+    KHR_materials_anisotropy: Anisotropy = Anisotropy()
     KHR_materials_clearcoat: Clearcoat = Clearcoat()
     KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
     KHR_materials_ior: Ior = Ior()

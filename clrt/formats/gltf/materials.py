@@ -92,6 +92,7 @@ class Materials:
             double_sided=source.doubleSided,
             **self._gloss(source, primitive, user),
             **self._layers(extensions, primitive, user),
+            **self._anisotropy(index, extensions.KHR_materials_anisotropy, primitive, user),
         )
         made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
         solid = solid_faces(extensions, made, uv, faces)
@@ -102,7 +103,9 @@ class Materials:
             self._note(index, {"volume": volume and made.transmission != 0 and made.metallic != 1})
         if solid.any():
             parts.append((glass(extensions, made), faces[solid]))
-            layers = {layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR")}
+            layers = {
+                layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR", "ANISOTROPY")
+            }
             self._note(index, {"alphaMode": coverage.get("opacity", 1.0) != 1, **layers})
         return parts
 
@@ -160,6 +163,21 @@ class Materials:
             "specular": number(specular.specularFactor, specular.specularTexture, "alpha"),
             "specular_color": color((red, green, blue), specular.specularColorTexture),
             "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red"),
+        }
+
+    def _anisotropy(self, index: int, source: looks.Anisotropy, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
+        """Return the fields of anisotropy, which needs tangents or texture coordinates."""
+        strength = _unit(source.anisotropyStrength)
+        if strength == 0:
+            return {}
+        if not {"TANGENT", "TEXCOORD_0", "TEXCOORD_1"} & set(primitive.attributes):
+            self._note(index, {"anisotropy": True})
+            return {}
+        directions = self._texture(source.anisotropyTexture, primitive, user)
+        return {
+            "anisotropy": _numbered(strength, directions, "blue"),
+            "anisotropy_degrees": math.degrees(source.anisotropyRotation),
+            "anisotropy_map": directions,
         }
 
     def _bend(self, info: looks.NormalTextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:

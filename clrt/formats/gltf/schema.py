@@ -26,6 +26,7 @@ BOM = b"\xef\xbb\xbf"
 EXTENSIONS = frozenset(
     f"KHR_materials_{name}"
     for name in (
+        "anisotropy",
         "clearcoat",
         "emissive_strength",
         "ior",
