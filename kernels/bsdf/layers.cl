@@ -60,7 +60,12 @@ static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, re
 #if THROUGH
 // Light transmitted by the microfacets in a single bounce.
 static inline real3 passed_on(const struct metallic_roughness *m, real cos_h) {
+#if IRIDESCENCE
+    real3 plain = fresnel_to(m->film_f0, m->body_f90, cos_h);
+    return mul(sub(splat(ONE), with_film(&m->thin_film, m->film_f0, plain, cos_h)), m->through);
+#else
     return mul(sub(splat(ONE), fresnel_to(m->body_f0, m->body_f90, cos_h)), m->through);
+#endif
 }
 #endif
 

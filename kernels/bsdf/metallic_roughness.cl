@@ -17,6 +17,7 @@
 //   r(wi)·r(wo)/(pi·mean r), r(c) = albedo·(1 − E(c)) + multiple·lost(c)
 //
 // ANISOTROPY: two roughnesses along axes on the surface (anisotropy.cl).
+// IRIDESCENCE: interference in a thin film changes F (iridescence.cl).
 // SPECULAR: f0 of the dielectric part times specular·specular_color; F ends at `specular` (glTF's
 // KHR_materials_specular).
 // LAYERS: layers on top, and transmission (layers.cl).
@@ -27,6 +28,7 @@
 #include SHEEN_FILE
 #include ANISOTROPY_FILE
 #include ANISOTROPY_ALBEDO_FILE
+#include IRIDESCENCE_FILE
 
 #if ANISOTROPY
 #define STRETCHED(m, w) stretched_by(&m->anisotropy, w)
@@ -75,6 +77,10 @@ struct metallic_roughness {
     real alpha;
     ireal smith, coupling;
     LobeShares shares;
+#if IRIDESCENCE
+    ThinFilm thin_film;
+    real3 film_f0;              // of the dielectric part without the film; body_f0 bounds that with it
+#endif
 #if ANISOTROPY
     Anisotropy anisotropy;      // alpha: √(alpha_t·alpha_b)
 #endif
@@ -134,6 +140,14 @@ static inline real3 body_left(const struct metallic_roughness *m, Bounce bounce)
     return mul(m->albedo, sub(splat(ONE), bounce_albedo(m->body_f0, m->body_f90, bounce)));
 }
 
+#if IRIDESCENCE
+#define BODY_LEFT(m, bounce, cosine) body_left_at(m, bounce, cosine)
+#define LEFT_ALBEDO(m, bounce, cosine) left_albedo_at(m, bounce, cosine)
+#else
+#define BODY_LEFT(m, bounce, cosine) body_left(m, bounce)
+#define LEFT_ALBEDO(m, bounce, cosine) left_albedo(m, bounce)
+#endif
+
 // The factor r of the diffuse lobe.
 static inline real3 left_albedo(const struct metallic_roughness *m, Bounce bounce) {
     real3 left = body_left(m, bounce);
@@ -169,8 +183,30 @@ static inline real3 fresnel_to(real3 f0, real f90, real cos_theta) {
     return mad3(sub(splat(f90), f0), c2 * c2 * c, f0);
 }
 
+#if COUPLING_ALBEDO && IRIDESCENCE
+// The same at an angle, where a film may reflect more.
+static inline real3 body_left_at(const struct metallic_roughness *m, Bounce bounce, real cosine) {
+    real3 plain = fresnel_to(m->film_f0, m->body_f90, cosine);
+    real3 here = f0_of(with_film(&m->thin_film, m->film_f0, plain, cosine), m->body_f90, cosine), most = m->body_f0;
+    here = vector(maximum(here.x, most.x), maximum(here.y, most.y), maximum(here.z, most.z));
+    return mul(m->albedo, sub(splat(ONE), bounce_albedo(here, m->body_f90, bounce)));
+}
+
+static inline real3 left_albedo_at(const struct metallic_roughness *m, Bounce bounce, real cosine) {
+    real3 left = body_left_at(m, bounce, cosine);
+#if MULTIPLE_SCATTERING
+    left = mad3(m->multiple, bounce.lost, left);
+#endif
+    return left;
+}
+#endif
+
 static inline real3 base_fresnel(const struct metallic_roughness *m, real cos_theta) {
+#if IRIDESCENCE
+    return with_film(&m->thin_film, m->f0, fresnel_to(m->f0, F90(m), cos_theta), cos_theta);
+#else
     return fresnel_to(m->f0, F90(m), cos_theta);
+#endif
 }
 
 // 1 − F, with 1 − (1 − c)^5 expanded so that it keeps its precision at grazing angles.
@@ -207,6 +243,21 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.alpha = maximum(roughness * roughness, (real)(ALPHA_MIN));
     m.smith = TO_INT(PARAMETER(metallic_roughness, smith));
     m.coupling = TO_INT(PARAMETER(metallic_roughness, coupling));
+#if IRIDESCENCE
+    m.thin_film.strength = PARAMETER(metallic_roughness, iridescence);
+    m.thin_film.ior = PARAMETER(metallic_roughness, iridescence_ior);
+    real thinnest = PARAMETER(metallic_roughness, iridescence_thickness_minimum);
+    real thickest = PARAMETER(metallic_roughness, iridescence_thickness);
+    m.thin_film.thickness = mix(thinnest, thickest, PARAMETER(metallic_roughness, iridescence_thickness_map));
+    ireal covered = m.thin_film.strength > 0.0f;
+    m.film_f0 = specular;
+    // What is left to the lobes below.
+    if (ANY(covered)) {
+        real3 bound = mad3(sub(film_bound(&m.thin_film, specular), specular), m.thin_film.strength, specular);
+        specular = choose(covered, bound, specular);
+        f90 = covered ? mix(f90, ONE, m.thin_film.strength) : f90;
+    }
+#endif
 #if CLEARCOAT
     m.coat = PARAMETER(metallic_roughness, clearcoat);
     m.coat_alpha = maximum(square(PARAMETER(metallic_roughness, clearcoat_roughness)), (real)(ALPHA_MIN));
@@ -267,6 +318,9 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     real lost = m.bounces.mean.lost;
     real3 f = choose(BY_ALBEDO(&m), color, m.f0);
     f = mad3(f, (real)(20.0f / 21.0f), splat((real)(1.0f / 21.0f)));     // the mean of F, weighted by cosines
+#if IRIDESCENCE
+    f = with_film(&m.thin_film, choose(BY_ALBEDO(&m), color, m.f0), f, (real)(2.0f / 3.0f));     // the mean cosine
+#endif
     real3 kept = sub(splat(ONE), scale(f, lost));
     real part = PARAMETER(metallic_roughness, multiple) * (BY_ALBEDO(&m) ? metallic : ONE) * (1.0f - lost);
     m.multiple = scale(vector(f.x * f.x / kept.x, f.y * f.y / kept.y, f.z * f.z / kept.z), part);
@@ -287,6 +341,9 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     Bounce bounce_o = ggx_bounce(&m.bounces, cos_o);
 #endif
     specular_o = m.coupling == 0 ? luminance(bounce_albedo(m.f0, F90(&m), bounce_o)) : specular_o;
+#if IRIDESCENCE
+    specular_o = covered ? luminance(fresnel_o) * (1.0f - bounce_o.lost) : specular_o;
+#endif
 #endif
 #if MULTIPLE_SCATTERING
     m.lost_o = bounce_o.lost * inverse_or_zero(lost);     // forms that no material needs have no fits in the program
@@ -297,13 +354,13 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.body_f90 = f90;
 #endif
 #if COUPLING_ALBEDO
-    real3 mean = left_albedo(&m, m.bounces.mean), left = left_albedo(&m, bounce_o);
+    real3 mean = left_albedo(&m, m.bounces.mean), left = LEFT_ALBEDO(&m, bounce_o, cos_o);
 #if LAYERS
     m.left_o = left;
 #else
     m.left_o = vector(left.x * inverse_or_zero(mean.x), left.y * inverse_or_zero(mean.y), left.z * inverse_or_zero(mean.z));
 #endif
-    diffuse_o = BY_ALBEDO(&m) ? luminance(body_left(&m, bounce_o)) : diffuse_o;
+    diffuse_o = BY_ALBEDO(&m) ? luminance(BODY_LEFT(&m, bounce_o, cos_o)) : diffuse_o;
 #endif
 #if LAYERS
     lay_over(&m, surface, specular_o, multiple_o, diffuse_o);

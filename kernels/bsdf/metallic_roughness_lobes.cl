@@ -25,8 +25,8 @@ static inline BsdfValue diffuse_lobes(const struct metallic_roughness *m, real3 
     pdf += m->shares.multiple * multiple_pdf(m, wi.z);
 #endif
 #if COUPLING_ALBEDO
-    body = choose(BY_ALBEDO(m), mul(m->left_o, body_left(m, bounce_i)), body);
-    both = choose(BY_ALBEDO(m), mul(m->left_o, left_albedo(m, bounce_i)), both);
+    body = choose(BY_ALBEDO(m), mul(m->left_o, BODY_LEFT(m, bounce_i, wi.z)), body);
+    both = choose(BY_ALBEDO(m), mul(m->left_o, LEFT_ALBEDO(m, bounce_i, wi.z)), both);
 #endif
     real cosine = wi.z * (1.0f / PI);
     return (BsdfValue){scale(both, cosine), scale(body, cosine), pdf};
@@ -60,7 +60,11 @@ static inline real3 BASE(albedo)(const struct metallic_roughness *m) {
 #else
     Bounce straight = ggx_bounce(&m->bounces, ONE);
 #endif
+#if IRIDESCENCE
+    real3 coupled = add(scale(base_fresnel(m, ONE), 1.0f - straight.lost), left_albedo(m, straight));
+#else
     real3 coupled = add(bounce_albedo(m->f0, F90(m), straight), left_albedo(m, straight));
+#endif
     albedo = choose(BY_ALBEDO(m), coupled, albedo);
 #endif
     return albedo;

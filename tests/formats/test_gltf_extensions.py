@@ -336,3 +336,27 @@ def test_anisotropy_without_a_direction(tmp_path: Path, caplog: pytest.LogCaptur
     made = of(tmp_path, {"name": "brushed", "extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 1}}})
     assert isinstance(made, MetallicRoughness) and made.anisotropy == 0
     assert caplog.messages[0].endswith('left out: anisotropy of material "brushed"')
+
+
+def test_iridescence(tmp_path: Path) -> None:
+    """The strength is red times the factor; green is the thickness between both ends, the upper one without."""
+    gltf = Gltf()
+    texture = image(gltf, TEXELS)
+    source = {
+        "iridescenceFactor": 0.5,
+        "iridescenceTexture": texture,
+        "iridescenceIor": 1.8,
+        "iridescenceThicknessMinimum": 200,
+        "iridescenceThicknessMaximum": 900,
+        "iridescenceThicknessTexture": texture,
+    }
+    (mesh,) = with_uv(tmp_path, gltf, {"extensions": {"KHR_materials_iridescence": source}}, np.zeros((1, 3, 2)))
+    made = mesh.material
+    assert isinstance(made, MetallicRoughness) and isinstance(made.iridescence, Texture)
+    assert (made.iridescence.channel, made.iridescence.factor) == ("red", 0.5)
+    blend = made.iridescence_thickness_map
+    assert isinstance(blend, Texture) and (blend.channel, blend.factor) == ("green", 1)
+    assert (made.iridescence_ior, made.iridescence_thickness_minimum, made.iridescence_thickness) == (1.8, 200, 900)
+    plain = of(tmp_path, {"extensions": {"KHR_materials_iridescence": {"iridescenceFactor": 1}}})
+    assert isinstance(plain, MetallicRoughness) and plain.iridescence == 1 and plain.iridescence_thickness_map == 1
+    assert (plain.iridescence_ior, plain.iridescence_thickness) == (1.3, 400)

@@ -173,8 +173,8 @@ def _mirror(material: Mirror) -> Plugin:
 def _metallic_roughness(material: MetallicRoughness) -> Plugin:
     """Return `principled`, exactly GGX, Schlick's Fresnel and separable Smith for pure metals; otherwise `gltf`."""
     values, has = material.parameters(), material.features()
-    if "ANISOTROPY" in has:
-        raise ValueError("anisotropy")
+    if unsupported := has & {"ANISOTROPY", "IRIDESCENCE"}:
+        raise ValueError(" and ".join(sorted(unsupported)).lower())
     if (
         material.smith == "separable"
         and values["metallic"] == 1

@@ -104,6 +104,15 @@ class Ior(Part):
     ior: float = 1.5
 
 
+class Iridescence(Part):
+    iridescenceFactor: float = 0.0
+    iridescenceTexture: TextureInfo | None = None
+    iridescenceIor: float = 1.3
+    iridescenceThicknessMinimum: float = 100.0
+    iridescenceThicknessMaximum: float = 400.0
+    iridescenceThicknessTexture: TextureInfo | None = None
+
+
 class Sheen(Part):
     sheenColorFactor: Vec3 = (0.0, 0.0, 0.0)
     sheenColorTexture: TextureInfo | None = None
@@ -146,6 +155,7 @@ class MaterialExtensions(Part):
     KHR_materials_clearcoat: Clearcoat = Clearcoat()
     KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
     KHR_materials_ior: Ior = Ior()
+    KHR_materials_iridescence: Iridescence = Iridescence()
     KHR_materials_pbrSpecularGlossiness: SpecularGlossiness | None = None
     KHR_materials_sheen: Sheen = Sheen()
     KHR_materials_specular: Specular = Specular()

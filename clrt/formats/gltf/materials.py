@@ -92,6 +92,7 @@ class Materials:
             double_sided=source.doubleSided,
             **self._gloss(source, primitive, user),
             **self._layers(extensions, primitive, user),
+            **self._thin_film(extensions.KHR_materials_iridescence, primitive, user),
             **self._anisotropy(index, extensions.KHR_materials_anisotropy, primitive, user),
         )
         made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
@@ -104,7 +105,8 @@ class Materials:
         if solid.any():
             parts.append((glass(extensions, made), faces[solid]))
             layers = {
-                layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR", "ANISOTROPY")
+                layer.lower(): layer in made.features()
+                for layer in ("CLEARCOAT", "SHEEN", "SPECULAR", "ANISOTROPY", "IRIDESCENCE")
             }
             self._note(index, {"alphaMode": coverage.get("opacity", 1.0) != 1, **layers})
         return parts
@@ -163,6 +165,20 @@ class Materials:
             "specular": number(specular.specularFactor, specular.specularTexture, "alpha"),
             "specular_color": color((red, green, blue), specular.specularColorTexture),
             "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red"),
+        }
+
+    def _thin_film(self, source: looks.Iridescence, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
+        """Return the fields of iridescence."""
+        strength = _unit(source.iridescenceFactor)
+        if strength == 0:
+            return {}
+        thickness = self._texture(source.iridescenceThicknessTexture, primitive, user)
+        return {
+            "iridescence": _numbered(strength, self._texture(source.iridescenceTexture, primitive, user), "red"),
+            "iridescence_ior": float(np.clip(source.iridescenceIor, 1, MOST_IOR)),
+            "iridescence_thickness": max(source.iridescenceThicknessMaximum, 0.0),
+            "iridescence_thickness_minimum": max(source.iridescenceThicknessMinimum, 0.0),
+            "iridescence_thickness_map": _numbered(1.0, thickness, "green"),
         }
 
     def _anisotropy(self, index: int, source: looks.Anisotropy, primitive: gltf.Primitive, user: str) -> dict[str, Any]:

@@ -30,6 +30,7 @@ EXTENSIONS = frozenset(
         "clearcoat",
         "emissive_strength",
         "ior",
+        "iridescence",
         "pbrSpecularGlossiness",
         "sheen",
         "specular",

@@ -10,10 +10,18 @@ from ..fields.limits import Ge, Le
 from . import anisotropy_energy, layer_energy
 from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
 from .presets import F0_PRESETS, Preset
-from .textures import WHITE, Texture
+from .textures import WHITE, NonNegative, Texture
 
 Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
 Coupling = Literal["albedo", "fresnel", "half_vector"]
+#: Fields of the thin film.
+FILM = (
+    "iridescence",
+    "iridescence_ior",
+    "iridescence_thickness",
+    "iridescence_thickness_minimum",
+    "iridescence_thickness_map",
+)
 #: Stands for a texture where only the tangent along u is needed.
 ALONG_U = Texture(picture=WHITE)
 
@@ -46,7 +54,9 @@ class MetallicRoughness(Material):
     affected by `clearcoat_normal_map` alone. `sheen_color`: fibres. `transmission`: the fraction of the dielectric part
     that is a thin transmissive sheet. `anisotropy`: alpha along a direction on the surface is mix(alpha, 1,
     anisotropy²): along the tangent, turned by `anisotropy_degrees` counter-clockwise, or along the directions of
-    `anisotropy_map`, red and green from −1 to 1, turned likewise.
+    `anisotropy_map`, red and green from −1 to 1, turned likewise. `iridescence`: the fraction of the surface with a
+    thin film of `iridescence_ior`, whose thickness in nanometers is `iridescence_thickness`, or where the map is 0
+    `iridescence_thickness_minimum`.
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
@@ -54,6 +64,7 @@ class MetallicRoughness(Material):
         "LAYERS",
         "LAYER_ENERGY",
         "SHEEN",
+        "IRIDESCENCE",
         "ANISOTROPY",
         "ANISOTROPY_ALBEDO",
         "GGX_ALBEDO",
@@ -78,6 +89,11 @@ class MetallicRoughness(Material):
     anisotropy: Unit | Texture = 0.0
     anisotropy_degrees: float = 0.0
     anisotropy_map: Texture | None = None
+    iridescence: Unit | Texture = 0.0
+    iridescence_ior: Annotated[float, Ge(1), Le(4)] = 1.3
+    iridescence_thickness: NonNegative = 400.0
+    iridescence_thickness_minimum: NonNegative = 100.0
+    iridescence_thickness_map: Unit | Texture = 1.0
 
     def parameters(self) -> dict[str, Parameter]:
         color, f0, metallic = self.color, (((self.ior - 1) / (self.ior + 1)) ** 2,) * 3, self.metallic
@@ -117,6 +133,8 @@ class MetallicRoughness(Material):
             }
         if "ANISOTROPY" in has:
             values |= self._anisotropic("ANISOTROPY_ALBEDO" in has)
+        if "IRIDESCENCE" in has:
+            values |= {name: getattr(self, name) for name in FILM}
         return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
 
     def _anisotropic(self, with_albedo: bool) -> dict[str, Parameter]:
@@ -155,7 +173,10 @@ class MetallicRoughness(Material):
 
     def conflicts(self) -> list[str]:
         fault = 'anisotropy: is for smith = "height_correlated"; leave smith out, or write anisotropy = 0'
-        return [fault] if self.anisotropy != 0 and self.smith != "height_correlated" else []
+        faults = [fault] if self.anisotropy != 0 and self.smith != "height_correlated" else []
+        if self.iridescence != 0 and self.coupled_by != "albedo":
+            faults.append('iridescence: is for coupling = "albedo"; write that, or iridescence = 0')
+        return faults
 
     @property
     def lobes(self) -> Lobes:
@@ -200,6 +221,7 @@ class MetallicRoughness(Material):
             "LAYER_ENERGY": above,
             "LAYER_ROWS": above
             and any(isinstance(r, Texture) for r in (self.roughness, self.clearcoat_roughness, self.sheen_roughness)),
+            "IRIDESCENCE": self.iridescence != 0,
             "ANISOTROPY": self.anisotropy != 0,
             "ANISOTROPY_ALBEDO": self.anisotropy != 0 and bool(forms),
             "ANISOTROPY_MAP": self.anisotropy != 0 and self.anisotropy_map is not None,
