@@ -86,6 +86,9 @@ typedef struct {
 #if SCATTERS
     real lost;
 #endif
+#if DIFFUSE_THROUGH
+    real3 entering;
+#endif
     real other;
 } Means;
 
@@ -111,6 +114,10 @@ static inline void add_layers(const struct metallic_roughness *m, Means *mean) {
 #endif
 #if SCATTERS
     mean->lost += less[3];
+#endif
+#if DIFFUSE_THROUGH
+    Bounce removed = {less[1], less[2], less[3]};
+    mean->entering = add(mean->entering, sub(splat(less[0]), bounce_albedo(m->body_f0, m->body_f90, removed)));
 #endif
 }
 #endif

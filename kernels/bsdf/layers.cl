@@ -1,6 +1,8 @@
 // Layers on a metallic_roughness surface, and transmission through it, following glTF's extensions:
 //   CLEARCOAT  a clear coat on top, F0 = 0.04: factor `clearcoat`, GGX with its own roughness
 //   SHEEN      fibres over the rest: sheen_color·D(h)·V (sheen.cl)
+//   DIFFUSE_THROUGH  the fraction `diffuse_transmission` of the rest of the body is a thin sheet that transmits like
+//              Lambert, with the albedo coupling: diffuse_transmission_color·s(wo)·s(wi)/(pi·mean s), s = T·(1 − E)
 //   THROUGH    the fraction `transmission` of the body is a thin sheet: microfacet transmission without refraction,
 //              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side, F of the dielectric part
 //
@@ -82,6 +84,9 @@ static inline void lay_over(struct metallic_roughness *m, const Surface *surface
 #if SCATTERS
     mean.lost = m->bounces.mean.lost;
 #endif
+#if DIFFUSE_THROUGH
+    mean.entering = sub(splat(ONE), bounce_albedo(m->body_f0, m->body_f90, m->bounces.mean));
+#endif
 #if LAYER_ENERGY
     if (ANY(has_layers(m))) add_layers(m, &mean);
 #endif
@@ -113,13 +118,27 @@ static inline void lay_over(struct metallic_roughness *m, const Surface *surface
     share.scattered = left * luminance(m->scattered) * m->lost_o * m->bounces.mean.lost;
 #endif
     real sum = share.coat + share.sheen + share.scattered + share.through + share.base;
+#if DIFFUSE_THROUGH
+    share.diffuse = left * luminance(mul(m->diffuse_through, m->diffuse_o));
+    sum += share.diffuse;
+    m->diffuse_o = mul(scale(m->diffuse_o, left), vector(inverse_or_zero(mean.entering.x), inverse_or_zero(mean.entering.y), inverse_or_zero(mean.entering.z)));
+#endif
     ireal some = sum > 0.0f;
     real inverse = some ? 1.0f / sum : ZERO;
     m->layers = (LayerShares){share.coat * inverse, share.sheen * inverse, share.scattered * inverse,
                               share.through * inverse, some ? share.base * inverse : ONE};
+#if DIFFUSE_THROUGH
+    m->layers.diffuse = share.diffuse * inverse;
+#endif
 }
 
-#if THROUGH
+#if DIFFUSE_THROUGH && THROUGH
+static inline ireal metallic_roughness_transmits(const struct metallic_roughness *m) {
+    return (largest(m->through) > 0.0f) | (largest(m->diffuse_through) > 0.0f);
+}
+#elif DIFFUSE_THROUGH
+static inline ireal metallic_roughness_transmits(const struct metallic_roughness *m) { return largest(m->diffuse_through) > 0.0f; }
+#elif THROUGH
 static inline ireal metallic_roughness_transmits(const struct metallic_roughness *m) { return largest(m->through) > 0.0f; }
 #endif
 
@@ -150,13 +169,16 @@ static inline BsdfValue layers_reflected(const struct metallic_roughness *m, rea
     return at;
 }
 
-#if THROUGH
+#if THROUGH || DIFFUSE_THROUGH
 static inline BsdfValue layers_transmitted(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), mirrored = vector(base_i.x, base_i.y, -base_i.z);
+#if THROUGH
     real3 sum = add(base_o, mirrored);
     real facets = ggx_d(SQUEEZED(m, normalize3(sum)), m->alpha) / (4.0f * base_o.z);
     real3 on = passed_on(m, 0.5f * length3(sum));
+#endif
     Left left = left_at(m, mirrored.z, -IN_COAT(m, wi).z);
+#if THROUGH
     real seen = facets * smith_shadowing(STRETCHED(m, base_o), STRETCHED(m, mirrored), m->alpha, m->smith);
     real3 value = scale(on, seen * minimum(m->left.body, left.body));
     real pdf = m->layers.through * facets / (1.0f + ggx_lambda(STRETCHED(m, base_o), m->alpha));
@@ -164,6 +186,15 @@ static inline BsdfValue layers_transmitted(const struct metallic_roughness *m, r
     real lost = m->lost_o * BOUNCE_AT(m, mirrored).lost * mirrored.z * (1.0f / PI);
     value = mad3(m->scattered, lost * m->left.body * left.body * m->scattered_scale, value);
     pdf += m->layers.scattered * multiple_pdf(m, mirrored.z);
+#endif
+#else
+    real3 value = splat(ZERO);
+    real pdf = ZERO;
+#endif
+#if DIFFUSE_THROUGH
+    real3 enters = entering(m, BOUNCE_AT(m, mirrored), mirrored.z);
+    value = mad3(mul(m->diffuse_through, mul(m->diffuse_o, enters)), left.body * mirrored.z * (1.0f / PI), value);
+    pdf += m->layers.diffuse * cosine_pdf(mirrored.z);
 #endif
     ireal above = (base_o.z > 0.0f) & (mirrored.z > 0.0f);
     return choose_value(above, (BsdfValue){value, splat(ZERO), pdf}, no_value());
@@ -179,7 +210,7 @@ static inline BsdfValue layers_eval(const struct metallic_roughness *m, real3 wo
     at.pdf += folded.pdf;
 #endif
     at = choose_value((wo.z > 0.0f) & (wi.z > 0.0f), at, no_value());
-#if THROUGH
+#if THROUGH || DIFFUSE_THROUGH
     BsdfValue on = layers_transmitted(m, wo, wi);
 #if COAT_NORMALS
     folded = layers_transmitted(m, wo, across);
@@ -199,6 +230,9 @@ static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m
     real3 albedo = base_albedo(m);
 #if THROUGH
     albedo = add(albedo, passed_on(m, ONE));
+#endif
+#if DIFFUSE_THROUGH
+    albedo = mad3(mul(m->diffuse_through, entering(m, BOUNCE_AT(m, vector(ZERO, ZERO, ONE)), ONE)), ONE, albedo);
 #endif
     Left left = left_at(m, ONE, ONE);
     albedo = scale(albedo, left.body);
@@ -229,6 +263,13 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
     through = through | scattered;
 #endif
     sample.wi = choose(through, vector(mirrored.x, mirrored.y, -mirrored.z), sample.wi);
+#endif
+#if DIFFUSE_THROUGH
+    real before = share.coat + share.sheen + share.scattered;
+    ireal diffuse = !is_base & (lobe >= before) & (lobe < before + share.diffuse);
+    real3 down = sample_cosine(u);
+    sample.wi = choose(diffuse, vector(down.x, down.y, -down.z), sample.wi);
+    through = through | diffuse;
 #endif
 #if SHEEN
     real sine, cosine, r = safe_sqrt(1.0f - u.x * u.x);

@@ -69,7 +69,12 @@ typedef struct { real specular, multiple, diffuse; } LobeShares;
 typedef struct { real film, body, fibres, taken_f0, taken_f90, taken_fibres; } Left;
 
 // Probabilities of the lobes: approximately their shares of the outgoing light.
-typedef struct { real coat, sheen, scattered, through, base; } LayerShares;
+typedef struct {
+    real coat, sheen, scattered, through, base;
+#if DIFFUSE_THROUGH
+    real diffuse;
+#endif
+} LayerShares;
 #endif
 
 struct metallic_roughness {
@@ -80,6 +85,8 @@ struct metallic_roughness {
 #if IRIDESCENCE
     ThinFilm thin_film;
     real3 film_f0;              // of the dielectric part without the film; body_f0 bounds that with it
+    real3 metal_f0;
+    real metallic;
 #endif
 #if ANISOTROPY
     Anisotropy anisotropy;      // alpha: √(alpha_t·alpha_b)
@@ -132,6 +139,10 @@ struct metallic_roughness {
 #if THROUGH && MULTIPLE_SCATTERING
     real scattered_scale;
 #endif
+#if DIFFUSE_THROUGH
+    real3 diffuse_through;      // color of light that is transmitted diffusely
+    real3 diffuse_o;            // its factor at wo, over the mean
+#endif
 };
 
 #if COUPLING_ALBEDO
@@ -183,13 +194,24 @@ static inline real3 fresnel_to(real3 f0, real f90, real cos_theta) {
     return mad3(sub(splat(f90), f0), c2 * c2 * c, f0);
 }
 
+#if DIFFUSE_THROUGH && !IRIDESCENCE
+// The fraction of light that enters the body at an angle.
+static inline real3 entering(const struct metallic_roughness *m, Bounce bounce, real cosine) {
+    return sub(splat(ONE), bounce_albedo(m->body_f0, m->body_f90, bounce));
+}
+#endif
+
 #if COUPLING_ALBEDO && IRIDESCENCE
-// The same at an angle, where a film may reflect more.
-static inline real3 body_left_at(const struct metallic_roughness *m, Bounce bounce, real cosine) {
+// The fraction of light that enters the body at an angle, where a film may reflect more than its bound.
+static inline real3 entering(const struct metallic_roughness *m, Bounce bounce, real cosine) {
     real3 plain = fresnel_to(m->film_f0, m->body_f90, cosine);
     real3 here = f0_of(with_film(&m->thin_film, m->film_f0, plain, cosine), m->body_f90, cosine), most = m->body_f0;
     here = vector(maximum(here.x, most.x), maximum(here.y, most.y), maximum(here.z, most.z));
-    return mul(m->albedo, sub(splat(ONE), bounce_albedo(here, m->body_f90, bounce)));
+    return sub(splat(ONE), bounce_albedo(here, m->body_f90, bounce));
+}
+
+static inline real3 body_left_at(const struct metallic_roughness *m, Bounce bounce, real cosine) {
+    return mul(m->albedo, entering(m, bounce, cosine));
 }
 
 static inline real3 left_albedo_at(const struct metallic_roughness *m, Bounce bounce, real cosine) {
@@ -203,7 +225,12 @@ static inline real3 left_albedo_at(const struct metallic_roughness *m, Bounce bo
 
 static inline real3 base_fresnel(const struct metallic_roughness *m, real cos_theta) {
 #if IRIDESCENCE
-    return with_film(&m->thin_film, m->f0, fresnel_to(m->f0, F90(m), cos_theta), cos_theta);
+    real3 plain = fresnel_to(m->f0, F90(m), cos_theta);
+    ireal covered = m->thin_film.strength > 0.0f, dielectric = covered & (m->metallic < 1.0f), metal = covered & (m->metallic > 0.0f);
+    real3 film = splat(ZERO);
+    if (ANY(dielectric)) film = scale(film_fresnel(&m->thin_film, m->film_f0, cos_theta), 1.0f - m->metallic);
+    if (ANY(metal)) film = mad3(film_fresnel(&m->thin_film, m->metal_f0, cos_theta), m->metallic, film);
+    return choose(covered, mad3(sub(film, plain), m->thin_film.strength, plain), plain);
 #else
     return fresnel_to(m->f0, F90(m), cos_theta);
 #endif
@@ -251,6 +278,8 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.thin_film.thickness = mix(thinnest, thickest, PARAMETER(metallic_roughness, iridescence_thickness_map));
     ireal covered = m.thin_film.strength > 0.0f;
     m.film_f0 = specular;
+    m.metal_f0 = color;
+    m.metallic = metallic;
     // What is left to the lobes below.
     if (ANY(covered)) {
         real3 bound = mad3(sub(film_bound(&m.thin_film, specular), specular), m.thin_film.strength, specular);
@@ -292,6 +321,14 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.through = scale(m.albedo, transmission);
     m.scattered = scale(m.through, PARAMETER(metallic_roughness, multiple));
     m.albedo = scale(m.albedo, 1.0f - transmission);
+#endif
+#if DIFFUSE_THROUGH
+    real diffuse_transmission = PARAMETER(metallic_roughness, diffuse_transmission), body = (1.0f - metallic) * diffuse_transmission;
+#if THROUGH
+    body *= 1.0f - transmission;
+#endif
+    m.diffuse_through = scale(PARAMETER3(metallic_roughness, diffuse_transmission_color), body);
+    m.albedo = scale(m.albedo, 1.0f - diffuse_transmission);
 #endif
 #if LAYER_ENERGY
     m.scene = scene;
@@ -361,6 +398,9 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.left_o = vector(left.x * inverse_or_zero(mean.x), left.y * inverse_or_zero(mean.y), left.z * inverse_or_zero(mean.z));
 #endif
     diffuse_o = BY_ALBEDO(&m) ? luminance(BODY_LEFT(&m, bounce_o, cos_o)) : diffuse_o;
+#endif
+#if DIFFUSE_THROUGH
+    m.diffuse_o = entering(&m, bounce_o, cos_o);
 #endif
 #if LAYERS
     lay_over(&m, surface, specular_o, multiple_o, diffuse_o);

@@ -360,3 +360,24 @@ def test_iridescence(tmp_path: Path) -> None:
     plain = of(tmp_path, {"extensions": {"KHR_materials_iridescence": {"iridescenceFactor": 1}}})
     assert isinstance(plain, MetallicRoughness) and plain.iridescence == 1 and plain.iridescence_thickness_map == 1
     assert (plain.iridescence_ior, plain.iridescence_thickness) == (1.3, 400)
+
+
+def test_diffuse_transmission(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """The fraction is alpha times the factor; a volume is not rendered."""
+    gltf = Gltf()
+    texture = image(gltf, TEXELS)
+    source = {
+        "diffuseTransmissionFactor": 0.5,
+        "diffuseTransmissionTexture": texture,
+        "diffuseTransmissionColorFactor": [1, 0.5, 0.25],
+        "diffuseTransmissionColorTexture": texture,
+    }
+    extensions = {"KHR_materials_diffuse_transmission": source, "KHR_materials_volume": BLUE}
+    plain = {"metallicFactor": 0}
+    (mesh,) = with_uv(tmp_path, gltf, {"pbrMetallicRoughness": plain, "extensions": extensions}, np.zeros((1, 3, 2)))
+    made = mesh.material
+    assert isinstance(made, MetallicRoughness) and isinstance(made.diffuse_transmission, Texture)
+    assert (made.diffuse_transmission.channel, made.diffuse_transmission.factor) == ("alpha", 0.5)
+    color = made.diffuse_transmission_color
+    assert isinstance(color, Texture) and np.array_equal(np.array(color.factor), (1, 0.5, 0.25))
+    assert caplog.messages[0].endswith('left out: volume of material "material 0"')

@@ -133,7 +133,7 @@ def test_no_light_is_made(device: Device) -> None:
     materials: list[Any] = [
         MetallicRoughness(
             color=WHITE,
-            metallic=float(rng.choice([0, 0, 1])),
+            metallic=float(rng.choice([0, 0, 1, rng.random()])),
             roughness=float(rng.choice([0.05, 0.3, rng.random()])),
             ior=float(rng.uniform(1, 2.5)),
             iridescence=float(rng.choice([1, rng.random()])),

@@ -39,6 +39,15 @@ LAYERS: dict[str, tuple[dict[str, Any], ...]] = {
         {"sheen_color": (1.0, 1.0, 1.0), "sheen_roughness": 0.5},
         {"sheen_color": (0.2, 0.3, 0.4), "sheen_roughness": 1.0},
         {"transmission": 1.0},
+        {"diffuse_transmission": 1.0, "diffuse_transmission_color": COLOR},
+        {
+            "diffuse_transmission": 0.5,
+            "diffuse_transmission_color": (1.0, 1.0, 1.0),
+            "transmission": 0.5,
+            "clearcoat": 0.7,
+            "sheen_color": (0.5, 0.5, 0.5),
+            "sheen_roughness": 0.3,
+        },
         {"iridescence": 1.0},
         {
             "iridescence": 0.7,

@@ -173,7 +173,7 @@ def _mirror(material: Mirror) -> Plugin:
 def _metallic_roughness(material: MetallicRoughness) -> Plugin:
     """Return `principled`, exactly GGX, Schlick's Fresnel and separable Smith for pure metals; otherwise `gltf`."""
     values, has = material.parameters(), material.features()
-    if unsupported := has & {"ANISOTROPY", "IRIDESCENCE"}:
+    if unsupported := has & {"ANISOTROPY", "IRIDESCENCE", "DIFFUSE_THROUGH"}:
         raise ValueError(" and ".join(sorted(unsupported)).lower())
     if (
         material.smith == "separable"

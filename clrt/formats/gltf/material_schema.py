@@ -100,6 +100,13 @@ class Clearcoat(Part):
     clearcoatNormalTexture: NormalTextureInfo | None = None
 
 
+class DiffuseTransmission(Part):
+    diffuseTransmissionFactor: float = 0.0
+    diffuseTransmissionTexture: TextureInfo | None = None
+    diffuseTransmissionColorFactor: Vec3 = (1.0, 1.0, 1.0)
+    diffuseTransmissionColorTexture: TextureInfo | None = None
+
+
 class Ior(Part):
     ior: float = 1.5
 
@@ -153,6 +160,7 @@ class Unlit(Part):
 class MaterialExtensions(Part):
     KHR_materials_anisotropy: Anisotropy = Anisotropy()
     KHR_materials_clearcoat: Clearcoat = Clearcoat()
+    KHR_materials_diffuse_transmission: DiffuseTransmission = DiffuseTransmission()
     KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
     KHR_materials_ior: Ior = Ior()
     KHR_materials_iridescence: Iridescence = Iridescence()

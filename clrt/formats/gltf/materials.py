@@ -92,6 +92,7 @@ class Materials:
             double_sided=source.doubleSided,
             **self._gloss(source, primitive, user),
             **self._layers(extensions, primitive, user),
+            **self._diffuse_transmission(extensions.KHR_materials_diffuse_transmission, primitive, user),
             **self._thin_film(extensions.KHR_materials_iridescence, primitive, user),
             **self._anisotropy(index, extensions.KHR_materials_anisotropy, primitive, user),
         )
@@ -101,7 +102,8 @@ class Materials:
         if not solid.all():
             parts.append((replace(tinted(extensions, made), **coverage), faces[~solid]))
             volume = extensions.KHR_materials_volume.thicknessFactor > 0
-            self._note(index, {"volume": volume and made.transmission != 0 and made.metallic != 1})
+            transmits = made.transmission != 0 or made.diffuse_transmission != 0
+            self._note(index, {"volume": volume and transmits and made.metallic != 1})
         if solid.any():
             parts.append((glass(extensions, made), faces[solid]))
             layers = {
@@ -165,6 +167,22 @@ class Materials:
             "specular": number(specular.specularFactor, specular.specularTexture, "alpha"),
             "specular_color": color((red, green, blue), specular.specularColorTexture),
             "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red"),
+        }
+
+    def _diffuse_transmission(
+        self, source: looks.DiffuseTransmission, primitive: gltf.Primitive, user: str
+    ) -> dict[str, Any]:
+        """Return the fields of diffuse transmission."""
+        part = _unit(source.diffuseTransmissionFactor)
+        if part == 0:
+            return {}
+        info = source.diffuseTransmissionColorTexture
+        color = _cut(source.diffuseTransmissionColorFactor)
+        return {
+            "diffuse_transmission": _numbered(
+                part, self._texture(source.diffuseTransmissionTexture, primitive, user), "alpha"
+            ),
+            "diffuse_transmission_color": _colored(color, self._texture(info, primitive, user), info, 1.0),
         }
 
     def _thin_film(self, source: looks.Iridescence, primitive: gltf.Primitive, user: str) -> dict[str, Any]:

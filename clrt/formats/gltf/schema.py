@@ -28,6 +28,7 @@ EXTENSIONS = frozenset(
     for name in (
         "anisotropy",
         "clearcoat",
+        "diffuse_transmission",
         "emissive_strength",
         "ior",
         "iridescence",

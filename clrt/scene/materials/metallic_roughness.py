@@ -56,7 +56,8 @@ class MetallicRoughness(Material):
     anisotropy²): along the tangent, turned by `anisotropy_degrees` counter-clockwise, or along the directions of
     `anisotropy_map`, red and green from −1 to 1, turned likewise. `iridescence`: the fraction of the surface with a
     thin film of `iridescence_ior`, whose thickness in nanometers is `iridescence_thickness`, or where the map is 0
-    `iridescence_thickness_minimum`.
+    `iridescence_thickness_minimum`. `diffuse_transmission`: the fraction of the diffuse lobe that instead transmits
+    `diffuse_transmission_color` to the other side.
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
@@ -89,6 +90,8 @@ class MetallicRoughness(Material):
     anisotropy: Unit | Texture = 0.0
     anisotropy_degrees: float = 0.0
     anisotropy_map: Texture | None = None
+    diffuse_transmission: Unit | Texture = 0.0
+    diffuse_transmission_color: Albedo | Texture = (1.0, 1.0, 1.0)
     iridescence: Unit | Texture = 0.0
     iridescence_ior: Annotated[float, Ge(1), Le(4)] = 1.3
     iridescence_thickness: NonNegative = 400.0
@@ -133,6 +136,11 @@ class MetallicRoughness(Material):
             }
         if "ANISOTROPY" in has:
             values |= self._anisotropic("ANISOTROPY_ALBEDO" in has)
+        if "DIFFUSE_THROUGH" in has:
+            values |= {
+                "diffuse_transmission": self.diffuse_transmission,
+                "diffuse_transmission_color": self.diffuse_transmission_color,
+            }
         if "IRIDESCENCE" in has:
             values |= {name: getattr(self, name) for name in FILM}
         return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
@@ -174,8 +182,9 @@ class MetallicRoughness(Material):
     def conflicts(self) -> list[str]:
         fault = 'anisotropy: is for smith = "height_correlated"; leave smith out, or write anisotropy = 0'
         faults = [fault] if self.anisotropy != 0 and self.smith != "height_correlated" else []
-        if self.iridescence != 0 and self.coupled_by != "albedo":
-            faults.append('iridescence: is for coupling = "albedo"; write that, or iridescence = 0')
+        coupled = [name for name in ("iridescence", "diffuse_transmission") if getattr(self, name) != 0]
+        if self.coupled_by != "albedo":
+            faults += [f'{name}: is for coupling = "albedo"; write that, or {name} = 0' for name in coupled]
         return faults
 
     @property
@@ -199,6 +208,7 @@ class MetallicRoughness(Material):
             "CLEARCOAT": self.clearcoat != 0,
             "SHEEN": self.sheen_color != (0, 0, 0),
             "THROUGH": self.transmission != 0,
+            "DIFFUSE_THROUGH": self.diffuse_transmission != 0 and metallic != 1,
         }
         further = self.coupled_by == "albedo" if self.multiple_scattering is None else self.multiple_scattering
         # With the albedo coupling the diffuse lobe reflects what the specular one does not, so only metal loses energy.
@@ -226,7 +236,7 @@ class MetallicRoughness(Material):
             "ANISOTROPY_ALBEDO": self.anisotropy != 0 and bool(forms),
             "ANISOTROPY_MAP": self.anisotropy != 0 and self.anisotropy_map is not None,
             "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
-            "TRANSMISSION": layers["THROUGH"],
-            "TRANSMISSION_LOBES": layers["THROUGH"],
+            "TRANSMISSION": layers["THROUGH"] or layers["DIFFUSE_THROUGH"],
+            "TRANSMISSION_LOBES": layers["THROUGH"] or layers["DIFFUSE_THROUGH"],
         }
         return frozenset(name for name, present in has.items() if present)
