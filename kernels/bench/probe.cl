@@ -100,6 +100,9 @@ static Bsdf material_at(const Scene *scene, real code, real3 wo, ireal front) {
 #if ANISOTROPY
     surface.towards = wo;
 #endif
+#if DISPERSION
+    surface.throughput = splat(ONE);
+#endif
     Bsdf bsdf;
     bsdf_at(scene, &surface, &bsdf);
     return bsdf;
@@ -152,6 +155,9 @@ static Shading shading_between(const Scene *scene, real code, real3 ng, real3 ns
 #endif
 #if COAT_NORMALS
     surface->coat_normal = ns;
+#endif
+#if DISPERSION
+    surface->throughput = splat(ONE);
 #endif
     return shading_at(scene, negate(wo), surface);
 }

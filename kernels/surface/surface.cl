@@ -33,6 +33,9 @@ typedef struct {
 #if ANISOTROPY
     real3 towards;        // the direction to the viewer; set by turn_towards
 #endif
+#if DISPERSION
+    real3 throughput;     // of the path that arrives; 1 unless it is set
+#endif
 #if COAT_NORMALS
     real3 coat_normal;    // the shading normal after the coat's own normal map (surface/normal_maps.cl)
     real coat_cos_o;      // as cos_o, for coat_normal
@@ -193,6 +196,9 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
 #endif
 #if COAT_NORMALS
     surface.coat_normal = surface.ns;
+#endif
+#if DISPERSION
+    surface.throughput = splat(ONE);
 #endif
     return surface;
 }

@@ -381,3 +381,19 @@ def test_diffuse_transmission(tmp_path: Path, caplog: pytest.LogCaptureFixture) 
     color = made.diffuse_transmission_color
     assert isinstance(color, Texture) and np.array_equal(np.array(color.factor), (1, 0.5, 0.25))
     assert caplog.messages[0].endswith('left out: volume of material "material 0"')
+
+
+@pytest.mark.parametrize("roughness", [0, 0.5])
+def test_dispersion(roughness: float, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Of smooth solid glass; rough glass has none, with a message."""
+    extensions = {
+        "KHR_materials_transmission": {"transmissionFactor": 1},
+        "KHR_materials_volume": BLUE,
+        "KHR_materials_dispersion": {"dispersion": 0.36},
+    }
+    plain = {"metallicFactor": 0, "roughnessFactor": roughness}
+    made = of(tmp_path, {"pbrMetallicRoughness": plain, "extensions": extensions})
+    assert isinstance(made, Dielectric) and made.dispersion == (0.36 if roughness == 0 else 0)
+    assert [message.split("out: ")[1] for message in caplog.messages] == (
+        ['dispersion of rough glass of material "material 0"'] if roughness else []
+    )

@@ -229,6 +229,8 @@ def _phong(material: Phong) -> Plugin:
 
 
 def _dielectric(material: Dielectric) -> Plugin:
+    if material.dispersion:
+        raise ValueError("dispersion")
     if material.thin and (material.rough or untextured(material.color) != (1.0, 1.0, 1.0)):
         return {
             "type": "sheet",

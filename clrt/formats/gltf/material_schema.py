@@ -107,6 +107,10 @@ class DiffuseTransmission(Part):
     diffuseTransmissionColorTexture: TextureInfo | None = None
 
 
+class Dispersion(Part):
+    dispersion: float = 0.0
+
+
 class Ior(Part):
     ior: float = 1.5
 
@@ -161,6 +165,7 @@ class MaterialExtensions(Part):
     KHR_materials_anisotropy: Anisotropy = Anisotropy()
     KHR_materials_clearcoat: Clearcoat = Clearcoat()
     KHR_materials_diffuse_transmission: DiffuseTransmission = DiffuseTransmission()
+    KHR_materials_dispersion: Dispersion = Dispersion()
     KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
     KHR_materials_ior: Ior = Ior()
     KHR_materials_iridescence: Iridescence = Iridescence()

@@ -110,7 +110,11 @@ class Materials:
                 layer.lower(): layer in made.features()
                 for layer in ("CLEARCOAT", "SHEEN", "SPECULAR", "ANISOTROPY", "IRIDESCENCE")
             }
-            self._note(index, {"alphaMode": coverage.get("opacity", 1.0) != 1, **layers})
+            dispersion = extensions.KHR_materials_dispersion.dispersion > 0 and made.roughness != 0
+            self._note(
+                index,
+                {"alphaMode": coverage.get("opacity", 1.0) != 1, **layers, "dispersion of rough glass": dispersion},
+            )
         return parts
 
     def _note(self, index: int, lost: Mapping[str, bool]) -> None:

@@ -29,6 +29,7 @@ EXTENSIONS = frozenset(
         "anisotropy",
         "clearcoat",
         "diffuse_transmission",
+        "dispersion",
         "emissive_strength",
         "ior",
         "iridescence",
