@@ -215,7 +215,7 @@ def test_triangles_before_the_first() -> None:
             decode_triangles(stream(bytes([0xE1, code, table]) + bytes(15)), 3)
 
 
-def compressed(gltf: Gltf, extension: str, attribute_version: int) -> None:
+def compress(gltf: Gltf, extension: str, attribute_version: int) -> Gltf:
     """Replace all buffer views by compressed ones, in front of a buffer without content."""
     views, old = gltf.document["bufferViews"], bytes(gltf.data)
     gltf.data.clear()
@@ -233,23 +233,21 @@ def compressed(gltf: Gltf, extension: str, attribute_version: int) -> None:
         views[index] = {"buffer": 1, "byteLength": len(content), "extensions": {extension: facts}}
         gltf.data += encoded
     gltf.document["extensionsUsed"] = gltf.document["extensionsRequired"] = [extension]
+    return gltf
 
 
 @pytest.mark.parametrize("extension, version", [("EXT_meshopt_compression", 0), ("KHR_meshopt_compression", 1)])
 def test_compressed_files(extension: str, version: int, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """They have the triangles of the uncompressed file, whose corners may be rotated; no message."""
     (expected,) = read(ball(), tmp_path).meshes
-    gltf = ball()
-    compressed(gltf, extension, version)
-    (mesh,) = read(gltf, tmp_path).meshes
+    (mesh,) = read(compress(ball(), extension, version), tmp_path).meshes
     np.testing.assert_array_equal(mesh.vertices, expected.vertices)
     assert [sorted(face) for face in mesh.faces.tolist()] == [sorted(face) for face in expected.faces.tolist()]
     assert not caplog.text
 
 
 def facts(index: int, **changes: Any) -> Gltf:
-    gltf = ball()
-    compressed(gltf, "EXT_meshopt_compression", 0)
+    gltf = compress(ball(), "EXT_meshopt_compression", 0)
     gltf.document["bufferViews"][index]["extensions"]["EXT_meshopt_compression"] |= changes
     return gltf
 

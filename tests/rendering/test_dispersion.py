@@ -20,7 +20,8 @@ pytestmark = pytest.mark.statistics
 IOR, DISPERSION = 1.5, 3.0
 #: The extension's three indices.
 IORS = IOR + np.array([-1, 0, 1]) * (IOR - 1) * 0.025 * DISPERSION
-GLASS = Dielectric(ior=IOR, dispersion=DISPERSION, color=(0.9, 0.8, 0.7))
+COLOR = (0.9, 0.8, 0.7)
+GLASS = Dielectric(ior=IOR, dispersion=DISPERSION, color=COLOR)
 
 
 @pytest.mark.parametrize("front", [True, False])
@@ -41,7 +42,7 @@ def test_each_channel_follows_snells_and_fresnels_laws(device: Device, front: bo
         fresnel, cos_t = (float(part) for part in fresnel_dielectric(np.array(cosine), float(eta)))
         assert weight[up, channel].sum() / count == pytest.approx(fresnel, abs=0.015)
         own = ~up & (weight[:, channel] > 0)
-        assert weight[own, channel].sum() / count == pytest.approx(GLASS.color[channel] * (1 - fresnel), abs=0.04)
+        assert weight[own, channel].sum() / count == pytest.approx(COLOR[channel] * (1 - fresnel), abs=0.04)
         np.testing.assert_allclose(wi[own], np.tile([-sine / eta, 0, -cos_t], (own.sum(), 1)), atol=2e-4)
         assert not np.delete(weight[own], channel, axis=1).any()
 
