@@ -37,6 +37,7 @@ def load(
     animation: str | int | None = None,
     time: float | None = None,
     light_unit: LightUnit | None = None,
+    ignore_extensions: Iterable[str] = (),
 ) -> Scene:
     """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (.glb .gltf .obj .ply .stl .off).
 
@@ -48,11 +49,19 @@ def load(
     (KHR_materials_variants), and `animation` one of its animations, which `animate` renders. time: the seconds at which
     the animation, by default the first one, is shown as a still. light_unit: "photometric" for lights in candela and
     lux, "radiometric" for W/sr and W/m², "blender" for watts; by default as the file's generator and their brightness
-    suggest.
+    suggest. ignore_extensions: names of extensions that the file may require although clrt does not support them.
 
     Raises SceneError, which lists all problems.
     """
-    choice = ModelChoice(scene=scene, variant=variant, animation=animation, time=time, light_unit=light_unit)
+    given = (ignore_extensions,) if isinstance(ignore_extensions, str) else tuple(ignore_extensions)
+    choice = ModelChoice(
+        scene=scene,
+        variant=variant,
+        animation=animation,
+        time=time,
+        light_unit=light_unit,
+        ignore_extensions=given or None,
+    )
     return _load(path, camera, up, unit, choice)
 
 

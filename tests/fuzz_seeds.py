@@ -24,6 +24,7 @@ from .formats.test_meshes import (
     stl_ascii,
     stl_binary,
 )
+from .formats.test_meshopt import compress
 from .formats.test_ply import XYZ, Element, written
 from .formats.test_stl import binary
 from .fuzz import FORMATS, LARGEST, OBJ
@@ -134,6 +135,8 @@ def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
         "b.gltf": ball(),
         "cameras.gltf": cameras(),
         "draco.glb": compressed(),
+        "meshopt.glb": compress(ball(), "EXT_meshopt_compression", 0),
+        "meshopt 1.glb": compress(ball(), "KHR_meshopt_compression", 1),
         "textured.glb": textured((folder / "wood.jpg").read_bytes()),
     }.items():
         document.write(folder / name)

@@ -55,6 +55,12 @@ class LoadOptions:
         help="Unit of a bare glTF file's lights: candela and lux, W/sr and W/m², or Blender's watts. Default: by the "
         "program that wrote the file, and by the lights' brightness.",
     )
+    ignore_extensions: tuple[str, ...] = flag(
+        "--ignore-extension",
+        multiple=True,
+        metavar="NAME",
+        help="Read a bare glTF file without this extension, which it requires but clrt does not support.",
+    )
 
     def load(self, path: Path, moving: bool = False) -> Scene:
         """Load the scene or model. moving: whether its animation is rendered. Raises SceneError."""
@@ -67,5 +73,6 @@ class LoadOptions:
             animation=self.animation,
             time=self.animation_time,
             light_unit=self.light_unit,
+            ignore_extensions=self.ignore_extensions or None,
         )
         return load(path, self.camera, self.up, self.unit, choice, moving)

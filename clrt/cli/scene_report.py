@@ -84,7 +84,7 @@ def report_lines(report: Mapping[str, Any]) -> Iterator[str]:
         if isinstance(value, dict):
             value = "  ".join(f"{key} {_short(part)}" for key, part in value.items()) or "none"
         elif isinstance(value, list):
-            value = " ".join(value) or "none"
+            value = ("; " if name == "left_out" else " ").join(value) or "none"
         yield f"{name:13} {_short(value)}"
     yield from (f"{'material':13} {line}" for line in material_texts(report["material_list"]))
     yield from (f"{'light':13} {line}" for line in light_texts(report["light_list"]))

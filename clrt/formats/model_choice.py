@@ -1,4 +1,4 @@
-"""What is read of a model file that holds several scenes, animations or variants, and in which units."""
+"""What is read of a model file that holds several scenes, animations or variants, in which units, and without what."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ class ModelChoice:
     - variant: which of its variants of materials (KHR_materials_variants)
     - time: in seconds, at which the animation, by default the first one, is read as a still
     - light_unit: of its lights (see gltf/light_units.py)
+    - ignore_extensions: names of extensions that the file may require although clrt does not support them
     """
 
     scene: Named | None = None
@@ -30,6 +31,7 @@ class ModelChoice:
     variant: Named | None = None
     time: float | None = None
     light_unit: LightUnit | None = None
+    ignore_extensions: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
         """Raise UsageError for a time that is not a finite number, and for an unknown unit."""

@@ -90,7 +90,8 @@ class Model:
     """Content of a model file: meshes or instances, at least one, cameras by name in file order, and lights.
 
     - animation: the file's first one, or the one that was chosen
-    - contents: names of all that can be chosen, by kind: scenes, animations, variants
+    - contents: names of all that can be chosen, by kind: scenes, animations, variants; supported extensions that are
+      used; left_out: what is not rendered, and why
     - up: which of the file's axes points up
     - converted_from: the unit of the lights in the file, if it was guessed and they were converted
     """

@@ -92,6 +92,17 @@ static Bsdf material_at(const Scene *scene, real code, real3 wo, ireal front) {
     surface.cos_o = dot3(surface.ns, wo);
     surface.coat_cos_o = dot3(surface.coat_normal, wo);
 #endif
+#if ANISOTROPY && !COAT_NORMALS
+    surface.ns = vector(ZERO, ZERO, ONE);
+    surface.tangent = vector(ONE, ZERO, ZERO);
+    surface.handedness = ONE;
+#endif
+#if ANISOTROPY
+    surface.towards = wo;
+#endif
+#if DISPERSION
+    surface.throughput = splat(ONE);
+#endif
     Bsdf bsdf;
     bsdf_at(scene, &surface, &bsdf);
     return bsdf;
@@ -135,13 +146,18 @@ static Shading shading_between(const Scene *scene, real code, real3 ng, real3 ns
 #if VERTEX_COLORS
     surface->tint = splat(ONE);
 #endif
-#if NORMAL_MAPS
+#if TANGENTS
     surface->tangent = ns;
     surface->handedness = ZERO;
+#endif
+#if NORMAL_MAPS
     surface->unbent = ns;
 #endif
 #if COAT_NORMALS
     surface->coat_normal = ns;
+#endif
+#if DISPERSION
+    surface->throughput = splat(ONE);
 #endif
     return shading_at(scene, negate(wo), surface);
 }

@@ -37,6 +37,12 @@ static inline void take(const struct metallic_roughness *m, LayerEntry entry, Le
     left->taken_f0 = maximum(film * entry.part[0] + fibres * entry.part[2] - both * entry.part[4], ZERO);
     left->taken_f90 = maximum(film * entry.part[1] + fibres * entry.part[3] - both * entry.part[5], ZERO);
     left->taken_fibres = film * entry.part[6];
+#if ANISOTROPY
+    // The tables are those of isotropic surfaces: what min removes from anisotropic gloss is lost.
+    ireal lost = is_anisotropic(&m->anisotropy);
+    left->taken_f0 = lost ? ZERO : left->taken_f0;
+    left->taken_f90 = lost ? ZERO : left->taken_f90;
+#endif
 }
 #endif
 
@@ -80,6 +86,9 @@ typedef struct {
 #if SCATTERS
     real lost;
 #endif
+#if DIFFUSE_THROUGH
+    real3 entering;
+#endif
     real other;
 } Means;
 
@@ -105,6 +114,10 @@ static inline void add_layers(const struct metallic_roughness *m, Means *mean) {
 #endif
 #if SCATTERS
     mean->lost += less[3];
+#endif
+#if DIFFUSE_THROUGH
+    Bounce removed = {less[1], less[2], less[3]};
+    mean->entering = add(mean->entering, sub(splat(less[0]), bounce_albedo(m->body_f0, m->body_f90, removed)));
 #endif
 }
 #endif

@@ -8,6 +8,7 @@
 // where c = color is the transmittance from face to face. A rough sheet spreads both alike (as glTF's transmission).
 // ATTENUATION: absorption inside by the Beer–Lambert law (integrator/path_segment.cl). A sheet leaves the
 // surrounding absorption unchanged.
+// DISPERSION: each channel has an index of its own (dispersion.cl).
 #include "bsdf/interface.cl"
 
 static inline real fresnel_of_cosines(real cos_o, real cos_t, real eta) {
@@ -24,6 +25,11 @@ static inline real fresnel_dielectric(real cos_o, real eta, real *cos_t) {
     real reflected = fresnel_of_cosines(cos_o, *cos_t, eta);
     return cos2_t > 0.0f ? reflected : ONE;
 }
+
+#if DISPERSION
+// channel: the only one of the path, or −1. etas: eta of each channel.
+typedef struct { real3 etas; ireal channel; } Dispersion;
+#endif
 
 struct dielectric {
     real3 color;
@@ -42,6 +48,9 @@ struct dielectric {
 #endif
 #if ATTENUATION
     real3 absorption;   // beyond the surface, per unit of length
+#endif
+#if DISPERSION
+    Dispersion dispersion;
 #endif
 };
 
@@ -101,6 +110,7 @@ static inline BsdfSample smooth_dielectric_sample(const struct dielectric *m, re
 }
 
 #include ROUGH_DIELECTRIC_FILE
+#include DISPERSION_FILE
 #if !ROUGH_DIELECTRIC
 static inline BsdfValue dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) { return no_value(); }
 #endif
@@ -110,6 +120,10 @@ static inline struct dielectric dielectric_at(const Scene *scene, ireal index, c
     real ior = PARAMETER(dielectric, ior);
     m.color = COLOR(dielectric);
     m.eta = surface->front ? ior : 1.0f / ior;
+#if DISPERSION
+    m.dispersion = dispersion_at(ior, PARAMETER(dielectric, dispersion), surface);
+    m.eta = m.dispersion.channel < 0 ? m.eta : of_channel(m.dispersion.etas, m.dispersion.channel);
+#endif
 #if THIN_DIELECTRIC
     m.thin = PARAMETER(dielectric, thin) > 0.0f;
     m.eta = m.thin ? ior : m.eta;
@@ -134,6 +148,9 @@ static inline struct dielectric dielectric_at(const Scene *scene, ireal index, c
 
 static inline BsdfSample dielectric_sample(const struct dielectric *m, real3 wo, real2 u, real lobe) {
     BsdfSample sample = smooth_dielectric_sample(m, wo, lobe);
+#if DISPERSION
+    sample = dispersed(m, wo, lobe, sample);
+#endif
 #if ROUGH_DIELECTRIC
     ireal rough = m->alpha > 0.0f;
     if (ANY(rough)) {

@@ -1,6 +1,8 @@
 // Layers on a metallic_roughness surface, and transmission through it, following glTF's extensions:
 //   CLEARCOAT  a clear coat on top, F0 = 0.04: factor `clearcoat`, GGX with its own roughness
 //   SHEEN      fibres over the rest: sheen_color·D(h)·V (sheen.cl)
+//   DIFFUSE_THROUGH  the fraction `diffuse_transmission` of the rest of the body is a thin sheet that transmits like
+//              Lambert, with the albedo coupling: diffuse_transmission_color·s(wo)·s(wi)/(pi·mean s), s = T·(1 − E)
 //   THROUGH    the fraction `transmission` of the body is a thin sheet: microfacet transmission without refraction,
 //              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side, F of the dielectric part
 //
@@ -60,7 +62,12 @@ static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, re
 #if THROUGH
 // Light transmitted by the microfacets in a single bounce.
 static inline real3 passed_on(const struct metallic_roughness *m, real cos_h) {
+#if IRIDESCENCE
+    real3 plain = fresnel_to(m->film_f0, m->body_f90, cos_h);
+    return mul(sub(splat(ONE), with_film(&m->thin_film, m->film_f0, plain, cos_h)), m->through);
+#else
     return mul(sub(splat(ONE), fresnel_to(m->body_f0, m->body_f90, cos_h)), m->through);
+#endif
 }
 #endif
 
@@ -76,6 +83,9 @@ static inline void lay_over(struct metallic_roughness *m, const Surface *surface
 #endif
 #if SCATTERS
     mean.lost = m->bounces.mean.lost;
+#endif
+#if DIFFUSE_THROUGH
+    mean.entering = sub(splat(ONE), bounce_albedo(m->body_f0, m->body_f90, m->bounces.mean));
 #endif
 #if LAYER_ENERGY
     if (ANY(has_layers(m))) add_layers(m, &mean);
@@ -108,13 +118,27 @@ static inline void lay_over(struct metallic_roughness *m, const Surface *surface
     share.scattered = left * luminance(m->scattered) * m->lost_o * m->bounces.mean.lost;
 #endif
     real sum = share.coat + share.sheen + share.scattered + share.through + share.base;
+#if DIFFUSE_THROUGH
+    share.diffuse = left * luminance(mul(m->diffuse_through, m->diffuse_o));
+    sum += share.diffuse;
+    m->diffuse_o = mul(scale(m->diffuse_o, left), vector(inverse_or_zero(mean.entering.x), inverse_or_zero(mean.entering.y), inverse_or_zero(mean.entering.z)));
+#endif
     ireal some = sum > 0.0f;
     real inverse = some ? 1.0f / sum : ZERO;
     m->layers = (LayerShares){share.coat * inverse, share.sheen * inverse, share.scattered * inverse,
                               share.through * inverse, some ? share.base * inverse : ONE};
+#if DIFFUSE_THROUGH
+    m->layers.diffuse = share.diffuse * inverse;
+#endif
 }
 
-#if THROUGH
+#if DIFFUSE_THROUGH && THROUGH
+static inline ireal metallic_roughness_transmits(const struct metallic_roughness *m) {
+    return (largest(m->through) > 0.0f) | (largest(m->diffuse_through) > 0.0f);
+}
+#elif DIFFUSE_THROUGH
+static inline ireal metallic_roughness_transmits(const struct metallic_roughness *m) { return largest(m->diffuse_through) > 0.0f; }
+#elif THROUGH
 static inline ireal metallic_roughness_transmits(const struct metallic_roughness *m) { return largest(m->through) > 0.0f; }
 #endif
 
@@ -145,20 +169,32 @@ static inline BsdfValue layers_reflected(const struct metallic_roughness *m, rea
     return at;
 }
 
-#if THROUGH
+#if THROUGH || DIFFUSE_THROUGH
 static inline BsdfValue layers_transmitted(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), mirrored = vector(base_i.x, base_i.y, -base_i.z);
+#if THROUGH
     real3 sum = add(base_o, mirrored);
-    real facets = ggx_d(normalize3(sum), m->alpha) / (4.0f * base_o.z);
+    real facets = ggx_d(SQUEEZED(m, normalize3(sum)), m->alpha) / (4.0f * base_o.z);
     real3 on = passed_on(m, 0.5f * length3(sum));
+#endif
     Left left = left_at(m, mirrored.z, -IN_COAT(m, wi).z);
-    real seen = facets * smith_shadowing(base_o, mirrored, m->alpha, m->smith);
+#if THROUGH
+    real seen = facets * smith_shadowing(STRETCHED(m, base_o), STRETCHED(m, mirrored), m->alpha, m->smith);
     real3 value = scale(on, seen * minimum(m->left.body, left.body));
-    real pdf = m->layers.through * facets / (1.0f + ggx_lambda(base_o, m->alpha));
+    real pdf = m->layers.through * facets / (1.0f + ggx_lambda(STRETCHED(m, base_o), m->alpha));
 #if SCATTERS
-    real lost = m->lost_o * ggx_bounce(&m->bounces, mirrored.z).lost * mirrored.z * (1.0f / PI);
+    real lost = m->lost_o * BOUNCE_AT(m, mirrored).lost * mirrored.z * (1.0f / PI);
     value = mad3(m->scattered, lost * m->left.body * left.body * m->scattered_scale, value);
     pdf += m->layers.scattered * multiple_pdf(m, mirrored.z);
+#endif
+#else
+    real3 value = splat(ZERO);
+    real pdf = ZERO;
+#endif
+#if DIFFUSE_THROUGH
+    real3 enters = entering(m, BOUNCE_AT(m, mirrored), mirrored.z);
+    value = mad3(mul(m->diffuse_through, mul(m->diffuse_o, enters)), left.body * mirrored.z * (1.0f / PI), value);
+    pdf += m->layers.diffuse * cosine_pdf(mirrored.z);
 #endif
     ireal above = (base_o.z > 0.0f) & (mirrored.z > 0.0f);
     return choose_value(above, (BsdfValue){value, splat(ZERO), pdf}, no_value());
@@ -174,7 +210,7 @@ static inline BsdfValue layers_eval(const struct metallic_roughness *m, real3 wo
     at.pdf += folded.pdf;
 #endif
     at = choose_value((wo.z > 0.0f) & (wi.z > 0.0f), at, no_value());
-#if THROUGH
+#if THROUGH || DIFFUSE_THROUGH
     BsdfValue on = layers_transmitted(m, wo, wi);
 #if COAT_NORMALS
     folded = layers_transmitted(m, wo, across);
@@ -195,6 +231,9 @@ static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m
 #if THROUGH
     albedo = add(albedo, passed_on(m, ONE));
 #endif
+#if DIFFUSE_THROUGH
+    albedo = mad3(mul(m->diffuse_through, entering(m, BOUNCE_AT(m, vector(ZERO, ZERO, ONE)), ONE)), ONE, albedo);
+#endif
     Left left = left_at(m, ONE, ONE);
     albedo = scale(albedo, left.body);
 #if SHEEN
@@ -212,7 +251,10 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
     BsdfSample sample = base_sample(m, base_o, u, is_base ? minimum((lobe - below) / share.base, BELOW_ONE) : ZERO);
     ireal through = NO_LANES;
 #if THROUGH
-    real3 h = sample_visible_normal(base_o, m->alpha, u);
+    real3 h = sample_visible_normal(STRETCHED(m, base_o), m->alpha, u);
+#if ANISOTROPY
+    h = normalize3(STRETCHED(m, h));
+#endif
     real3 mirrored = sub(scale(h, 2.0f * dot3(base_o, h)), base_o);
     through = !is_base & (lobe >= below - share.through);
 #if SCATTERS
@@ -221,6 +263,13 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
     through = through | scattered;
 #endif
     sample.wi = choose(through, vector(mirrored.x, mirrored.y, -mirrored.z), sample.wi);
+#endif
+#if DIFFUSE_THROUGH
+    real before = share.coat + share.sheen + share.scattered;
+    ireal diffuse = !is_base & (lobe >= before) & (lobe < before + share.diffuse);
+    real3 down = sample_cosine(u);
+    sample.wi = choose(diffuse, vector(down.x, down.y, -down.z), sample.wi);
+    through = through | diffuse;
 #endif
 #if SHEEN
     real sine, cosine, r = safe_sqrt(1.0f - u.x * u.x);

@@ -158,6 +158,9 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
         v.end = hit ? (ireal)(END_DEPTH) : (ireal)(END_ESCAPED);
         active = NO_LANES;
 #if PRIMITIVES
+#if DISPERSION
+        surface.throughput = path.beta;
+#endif
         Shading shading = shading_at(&scene, path.wi, &surface);
         v.position = choose(hit, surface.p, splat(ZERO));
         v.geometric_normal = choose(hit, surface.ng, splat(ZERO));

@@ -21,6 +21,9 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
         active = hit;
         if (depth >= launch->max_depth || !ANY(active)) return L;
 #if PRIMITIVES
+#if DISPERSION
+        surface.throughput = path.beta;
+#endif
         Shading shading = shading_at(scene, path.wi, &surface);
 #if LIGHTS
         ShadowRay shadow;

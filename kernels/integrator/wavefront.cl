@@ -164,6 +164,9 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
         absorb(path, a.hits.t);
         add_light(w, a.travel.slot, emitted_light(scene, path, &surface, a.hits.t, active), depth);
         if (depth >= w->launch->max_depth) continue;
+#if DISPERSION
+        surface.throughput = path->beta;
+#endif
         Shading shading = shading_at(scene, path->wi, &surface);
         Sampler sampler = slot_sampler(w, a.travel.slot);
 #if SHADOWS

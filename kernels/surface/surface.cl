@@ -7,6 +7,8 @@
 #include "traverse/trace.cl"
 #include TEXTURE_FILES
 
+#define TANGENTS (NORMAL_MAPS || ANISOTROPY)
+
 typedef struct {
     real3 p, p_error;     // |p − exact| <= p_error by component
     real3 ng, ns;         // geometric and shading normal, both on the front side
@@ -21,10 +23,18 @@ typedef struct {
     real3 tint;
     real tint_opacity;
 #endif
-#if NORMAL_MAPS
+#if TANGENTS
     real3 tangent;        // not of unit length
     real handedness;      // of the bitangent; 0 without tangents, 2 on spheres (place_sphere_tangent)
+#endif
+#if NORMAL_MAPS
     real3 unbent;         // the shading normal before normal mapping
+#endif
+#if ANISOTROPY
+    real3 towards;        // the direction to the viewer; set by turn_towards
+#endif
+#if DISPERSION
+    real3 throughput;     // of the path that arrives; 1 unless it is set
 #endif
 #if COAT_NORMALS
     real3 coat_normal;    // the shading normal after the coat's own normal map (surface/normal_maps.cl)
@@ -97,7 +107,7 @@ static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal 
     surface->tint_opacity = b0 * GATHER(real, scene->colors, primitive, .c0[3]) + b1 * GATHER(real, scene->colors, primitive, .c1[3])
                           + b2 * GATHER(real, scene->colors, primitive, .c2[3]);
 #endif
-#if NORMAL_MAPS
+#if TANGENTS
     surface->tangent = mad3(PLACED_TANGENT(GATHER3(scene->tangents, primitive, .t0)), b0,
                        mad3(PLACED_TANGENT(GATHER3(scene->tangents, primitive, .t1)), b1,
                             scale(PLACED_TANGENT(GATHER3(scene->tangents, primitive, .t2)), b2)));
@@ -132,7 +142,7 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
     surface->tint = splat(ONE);
     surface->tint_opacity = ONE;
 #endif
-#if NORMAL_MAPS
+#if TANGENTS
     surface->tangent = vector(n.z, ZERO, -n.x);     // of length sin θ
     surface->handedness = (real)(2.0f);
 #endif
@@ -171,7 +181,7 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
         surface.tint = choose(is_sphere, other.tint, surface.tint);
         surface.tint_opacity = is_sphere ? other.tint_opacity : surface.tint_opacity;
 #endif
-#if NORMAL_MAPS
+#if TANGENTS
         surface.tangent = choose(is_sphere, other.tangent, surface.tangent);
         surface.handedness = is_sphere ? other.handedness : surface.handedness;
 #endif
@@ -186,6 +196,9 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
 #endif
 #if COAT_NORMALS
     surface.coat_normal = surface.ns;
+#endif
+#if DISPERSION
+    surface.throughput = splat(ONE);
 #endif
     return surface;
 }
@@ -202,6 +215,9 @@ static inline void turn_towards(Surface *surface, real3 towards) {
     surface->ng = choose(surface->front, surface->ng, negate(surface->ng));
     surface->ns = turned(surface->ns, surface, towards);
     surface->cos_o = dot3(surface->ns, towards);
+#if ANISOTROPY
+    surface->towards = towards;
+#endif
 #if NORMAL_MAPS
     surface->unbent = turned(surface->unbent, surface, towards);
 #endif

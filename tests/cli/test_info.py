@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from ..formats.glb import ball
 from .test_commands import clrt
 
 
@@ -51,3 +52,17 @@ material = "shell"
         "textured": ["color"],
     }
     assert found["light_list"][2] == {"type": "sphere", "name": "bulb", "radiance": [3, 2, 1]}
+
+
+def test_info_lists_the_extensions_of_a_model_and_what_is_left_out(tmp_path: Path) -> None:
+    """Supported extensions by name; others with the reason. A required one can be ignored by name."""
+    gltf = ball()
+    gltf.document["extensionsUsed"] = ["KHR_materials_ior", "KHR_mesh_quantization", "EXT_new"]
+    gltf.document["extensionsRequired"] = ["EXT_other"]
+    gltf.write(tmp_path / "a.glb")
+    refused = clrt("info", "a.glb", cwd=tmp_path)
+    assert refused.returncode and "--ignore-extension EXT_other" in refused.stderr
+    lines = clrt("info", "a.glb", "--ignore-extension", "EXT_other", cwd=tmp_path).stdout.splitlines()
+    found = dict(line.split(maxsplit=1) for line in lines if " " in line)
+    assert found["extensions"] == "KHR_materials_ior KHR_mesh_quantization"
+    assert found["left_out"] == "the extension EXT_new: is not supported; the extension EXT_other: is not supported"

@@ -177,6 +177,8 @@ def test_scenes_by_name(tmp_path: Path) -> None:
         "scenes": ["scene 0", "far", "0"],
         "animations": [],
         "variants": [],
+        "extensions": [],
+        "left_out": [],
     }
     with pytest.raises(SceneError, match=r'a.glb: scene: "fr" is unknown; use one of "scene 0", "far", "0"'):
         clrt.load(path, scene="fr")

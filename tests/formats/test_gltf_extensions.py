@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import logging
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,7 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 
 import clrt
 from clrt.errors import SceneError
@@ -208,22 +212,190 @@ def test_sheets_have_the_color_of_their_volume(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "refused"),
     [
-        ("KHR_materials_iridescence", False),
         ("KHR_materials_novel", False),
         ("KHR_animation_pointer", False),
-        ("KHR_texture_basisu", False),
+        ("MSFT_texture_dds", False),
         ("EXT_structural_metadata", False),
-        ("EXT_meshopt_compression", True),
+        ("MPEG_buffer_circular", True),
         ("KHR_gaussian_splatting", True),
     ],
 )
 def test_required_extensions(name: str, refused: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """Those of looks alone are ignored with a warning."""
+    """Those of looks alone are ignored with a warning, others if they are named."""
     gltf = ball()
     gltf.document["extensionsRequired"] = [name]
+    path, scene = gltf.write(tmp_path / "a.glb"), tmp_path / "a.toml"
+    scene.write_text(f'[[mesh]]\nfile = "a.glb"\nignore_extensions = ["{name}"]\n')
+    for loaded in (clrt.load(path, ignore_extensions=[name]), clrt.load(path, ignore_extensions=name), load(scene)):
+        assert loaded.meshes and caplog.messages[-1].endswith(f"left out: the extension {name}")
+    assert clrt.load(path, ignore_extensions=[name]).source.contents["left_out"] == [  # type: ignore[union-attr]
+        f"the extension {name}: is not supported"
+    ]
+    caplog.clear()
     with caplog.at_level(logging.WARNING):
         if refused:
-            with pytest.raises(SceneError, match=f"needs the extension {name}, which is not supported"):
+            with pytest.raises(
+                SceneError, match=f"needs the extension {name}, which is not supported.*--ignore-extension {name};"
+            ):
                 read(gltf, tmp_path)
         else:
             assert read(gltf, tmp_path).meshes and f"left out: the extension {name}" in caplog.text
+
+
+TEXELS = np.array([[[200, 100, 50], [10, 20, 30]], [[250, 250, 250], [0, 0, 0]]], np.uint8).repeat(8, 0).repeat(8, 1)
+#: TEXELS in Basis Universal's UASTC, by its own encoder (basisu 2.5), with Zstandard.
+KTX2 = (
+    "t4mZ^ATlt!4GJ0x000000RR915C8xG5C8xG00000000000RR910RR910ssI2XaE2JEC2uilmGw#Bme*a00000000000000000000"
+    "xBvhE00000Jpcdz000000096100000EC2ui000000strgrU3!~0|Nj65C8xG00000004gg0000000000|NsC09{>OVOH^2Qa%psB"
+    "asWbMb7^xRRc>i^WpZ<2Y#=f&F)#oCD77#BU;qG}0RZ?HnM~$CwTb{&fx_ee8l+cWU;kfv?*SJ80N@`0000L71rh)tp8>f8mI7F8"
+    "CISTD0s"
+)
+
+
+def encoded(extension: str) -> bytes:
+    if extension == "KHR_texture_basisu":
+        return base64.b85decode(KTX2)
+    content = io.BytesIO()
+    kind = {"EXT_texture_webp": "WEBP", "EXT_texture_avif": "AVIF"}[extension]
+    Image.fromarray(TEXELS).save(content, kind, quality=100, lossless=kind == "WEBP", subsampling="4:4:4")
+    return content.getvalue()
+
+
+def textured(gltf: Gltf, texture: dict[str, Any], folder: Path) -> Texture | tuple[float, ...]:
+    """Return the base color of a material with this texture."""
+    gltf.document["textures"] = [texture]
+    material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 0.5, 1, 1]}}
+    (mesh,) = with_uv(folder, gltf, material, np.zeros((1, 3, 2)))
+    assert isinstance(mesh.material, MetallicRoughness)
+    return mesh.material.color
+
+
+@pytest.mark.parametrize("required", [False, True])
+@pytest.mark.parametrize("extension", ["EXT_texture_webp", "EXT_texture_avif", "KHR_texture_basisu"])
+def test_image_formats(extension: str, required: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Decoded as their encoders' libraries do, up to the loss of compression; no message."""
+    if extension == "KHR_texture_basisu":
+        pytest.importorskip("opengl_basisu")
+    gltf = Gltf()
+    gltf.document["images"] = [{"bufferView": gltf.view(encoded(extension))}]
+    gltf.document["extensionsUsed"] = [extension]
+    gltf.document["extensionsRequired"] = [extension] * required
+    color = textured(gltf, {"extensions": {extension: {"source": 0}}}, tmp_path)
+    assert isinstance(color, Texture) and np.array_equal(np.array(color.factor), (1, 0.5, 1))
+    assert color.picture.texels.shape == (16, 16, 4) and not caplog.text
+    assert np.abs(color.picture.texels[..., :3].astype(int) - TEXELS).max() <= 8
+
+
+@pytest.mark.parametrize("with_png", [False, True])
+def test_basis_universal_without_its_decoder(
+    with_png: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The PNG or JPEG that the file also has is used; without one the texture is left out with one message."""
+    monkeypatch.setattr("clrt.formats.images.image_reader.find_spec", lambda name: None)
+    gltf = Gltf()
+    png = image(gltf, TEXELS)["index"] if with_png else 0
+    gltf.document.setdefault("images", []).append({"bufferView": gltf.view(encoded("KHR_texture_basisu"))})
+    extension = {"KHR_texture_basisu": {"source": len(gltf.document["images"]) - 1}}
+    color = textured(gltf, {"extensions": extension, **({"source": png} if with_png else {})}, tmp_path)
+    if with_png:
+        assert isinstance(color, Texture) and not caplog.text
+        np.testing.assert_array_equal(color.picture.texels[..., :3], TEXELS)
+        return
+    assert color == pytest.approx((0.8, 0.4, 0.8))
+    (message,) = caplog.messages
+    assert re.search(
+        "a.glb: a texture is left out: image 0: is compressed with Basis.*pip install opengl-basisu", message
+    )
+
+
+def test_another_image_replaces_a_damaged_one(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    gltf = Gltf()
+    png = image(gltf, TEXELS)["index"]
+    gltf.document["images"].append({"bufferView": gltf.view(b"RIFF" + bytes(40))})
+    color = textured(gltf, {"source": png, "extensions": {"EXT_texture_webp": {"source": 1}}}, tmp_path)
+    assert isinstance(color, Texture) and not caplog.text
+    np.testing.assert_array_equal(color.picture.texels[..., :3], TEXELS)
+
+
+def test_anisotropy(tmp_path: Path) -> None:
+    """The strength is blue times the factor, the direction red and green; the rotation is in radians."""
+    gltf = Gltf()
+    source = {"anisotropyStrength": 0.5, "anisotropyRotation": np.pi / 6, "anisotropyTexture": image(gltf, TEXELS)}
+    material = {"extensions": {"KHR_materials_anisotropy": source}}
+    (mesh,) = with_uv(tmp_path, gltf, material, np.zeros((1, 3, 2)))
+    made = mesh.material
+    assert isinstance(made, MetallicRoughness) and made.anisotropy_degrees == pytest.approx(30)
+    assert isinstance(made.anisotropy, Texture) and (made.anisotropy.channel, made.anisotropy.factor) == ("blue", 0.5)
+    assert made.anisotropy_map is not None and made.anisotropy_map.picture is made.anisotropy.picture
+    plain = with_uv(
+        tmp_path, Gltf(), {"extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 2}}}, [[[0, 0]] * 3]
+    )
+    assert isinstance(plain[0].material, MetallicRoughness) and plain[0].material.anisotropy == 1
+
+
+def test_anisotropy_without_a_direction(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Primitives without tangents and texture coordinates are isotropic, with a message."""
+    made = of(tmp_path, {"name": "brushed", "extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 1}}})
+    assert isinstance(made, MetallicRoughness) and made.anisotropy == 0
+    assert caplog.messages[0].endswith('left out: anisotropy of material "brushed"')
+
+
+def test_iridescence(tmp_path: Path) -> None:
+    """The strength is red times the factor; green is the thickness between both ends, the upper one without."""
+    gltf = Gltf()
+    texture = image(gltf, TEXELS)
+    source = {
+        "iridescenceFactor": 0.5,
+        "iridescenceTexture": texture,
+        "iridescenceIor": 1.8,
+        "iridescenceThicknessMinimum": 200,
+        "iridescenceThicknessMaximum": 900,
+        "iridescenceThicknessTexture": texture,
+    }
+    (mesh,) = with_uv(tmp_path, gltf, {"extensions": {"KHR_materials_iridescence": source}}, np.zeros((1, 3, 2)))
+    made = mesh.material
+    assert isinstance(made, MetallicRoughness) and isinstance(made.iridescence, Texture)
+    assert (made.iridescence.channel, made.iridescence.factor) == ("red", 0.5)
+    blend = made.iridescence_thickness_map
+    assert isinstance(blend, Texture) and (blend.channel, blend.factor) == ("green", 1)
+    assert (made.iridescence_ior, made.iridescence_thickness_minimum, made.iridescence_thickness) == (1.8, 200, 900)
+    plain = of(tmp_path, {"extensions": {"KHR_materials_iridescence": {"iridescenceFactor": 1}}})
+    assert isinstance(plain, MetallicRoughness) and plain.iridescence == 1 and plain.iridescence_thickness_map == 1
+    assert (plain.iridescence_ior, plain.iridescence_thickness) == (1.3, 400)
+
+
+def test_diffuse_transmission(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """The fraction is alpha times the factor; a volume is not rendered."""
+    gltf = Gltf()
+    texture = image(gltf, TEXELS)
+    source = {
+        "diffuseTransmissionFactor": 0.5,
+        "diffuseTransmissionTexture": texture,
+        "diffuseTransmissionColorFactor": [1, 0.5, 0.25],
+        "diffuseTransmissionColorTexture": texture,
+    }
+    extensions = {"KHR_materials_diffuse_transmission": source, "KHR_materials_volume": BLUE}
+    plain = {"metallicFactor": 0}
+    (mesh,) = with_uv(tmp_path, gltf, {"pbrMetallicRoughness": plain, "extensions": extensions}, np.zeros((1, 3, 2)))
+    made = mesh.material
+    assert isinstance(made, MetallicRoughness) and isinstance(made.diffuse_transmission, Texture)
+    assert (made.diffuse_transmission.channel, made.diffuse_transmission.factor) == ("alpha", 0.5)
+    color = made.diffuse_transmission_color
+    assert isinstance(color, Texture) and np.array_equal(np.array(color.factor), (1, 0.5, 0.25))
+    assert caplog.messages[0].endswith('left out: volume of material "material 0"')
+
+
+@pytest.mark.parametrize("roughness", [0, 0.5])
+def test_dispersion(roughness: float, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Of smooth solid glass; rough glass has none, with a message."""
+    extensions = {
+        "KHR_materials_transmission": {"transmissionFactor": 1},
+        "KHR_materials_volume": BLUE,
+        "KHR_materials_dispersion": {"dispersion": 0.36},
+    }
+    plain = {"metallicFactor": 0, "roughnessFactor": roughness}
+    made = of(tmp_path, {"pbrMetallicRoughness": plain, "extensions": extensions})
+    assert isinstance(made, Dielectric) and made.dispersion == (0.36 if roughness == 0 else 0)
+    assert [message.split("out: ")[1] for message in caplog.messages] == (
+        ['dispersion of rough glass of material "material 0"'] if roughness else []
+    )

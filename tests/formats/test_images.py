@@ -319,7 +319,7 @@ def test_textures_are_read_as_stored(mode: str, dtype: str, tmp_path: Path) -> N
         expected[..., 3] = stored_pixels[..., -1]
     np.testing.assert_array_equal(read_texels(path), expected)
     np.testing.assert_array_equal(read_texels(path.read_bytes(), "a"), expected)
-    with pytest.raises(SceneError, match="image 3: is not a PNG, JPEG or WebP image"):
+    with pytest.raises(SceneError, match="image 3: is not a PNG, JPEG, WebP, AVIF or KTX 2 image"):
         read_texels(b"GIF89a" + bytes(20), "image 3")
     write_image(tmp_path / "a.exr", noise(3, 4, 3))
     with pytest.raises(SceneError, match="a.exr: contains floats, but textures have 8 bits per channel"):

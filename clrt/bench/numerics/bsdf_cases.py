@@ -25,7 +25,8 @@ NUMBERS: dict[str, tuple[Any, ...]] = {
     "ambient": (1.0,),
 }
 COLOR = (1.0, 0.5, 0.2)
-#: Sets of fields by kernel, each tested on its own with every second number; other variants leave them at defaults.
+#: Sets of fields by kernel, each tested on its own with every second number of the others; other variants leave them at
+#: defaults, except for the roughness. Anisotropic lobes are too narrow for the quadrature of densities if smooth.
 LAYERS: dict[str, tuple[dict[str, Any], ...]] = {
     "metallic_roughness": (
         {"ior": 2.0},
@@ -38,6 +39,29 @@ LAYERS: dict[str, tuple[dict[str, Any], ...]] = {
         {"sheen_color": (1.0, 1.0, 1.0), "sheen_roughness": 0.5},
         {"sheen_color": (0.2, 0.3, 0.4), "sheen_roughness": 1.0},
         {"transmission": 1.0},
+        {"diffuse_transmission": 1.0, "diffuse_transmission_color": COLOR},
+        {
+            "diffuse_transmission": 0.5,
+            "diffuse_transmission_color": (1.0, 1.0, 1.0),
+            "transmission": 0.5,
+            "clearcoat": 0.7,
+            "sheen_color": (0.5, 0.5, 0.5),
+            "sheen_roughness": 0.3,
+        },
+        {"iridescence": 1.0},
+        {
+            "iridescence": 0.7,
+            "iridescence_ior": 1.9,
+            "iridescence_thickness": 650.0,
+            "iridescence_thickness_minimum": 200.0,
+            "iridescence_thickness_map": 0.5,
+            "transmission": 0.5,
+            "clearcoat": 0.5,
+        },
+        {"roughness": 0.6, "anisotropy": 0.3},
+        {"roughness": 0.3, "anisotropy": 0.6, "anisotropy_degrees": 30.0},
+        {"roughness": 0.4, "anisotropy": 1.0, "anisotropy_degrees": 90.0, "clearcoat": 0.7},
+        {"roughness": 0.4, "anisotropy": 0.5, "transmission": 0.7, "sheen_color": COLOR, "sheen_roughness": 0.5},
         {
             "transmission": 0.5,
             "specular": 0.5,
@@ -47,7 +71,7 @@ LAYERS: dict[str, tuple[dict[str, Any], ...]] = {
             "sheen_roughness": 0.3,
         },
     ),
-    "dielectric": ({"multiple_scattering": False},),
+    "dielectric": ({"multiple_scattering": False}, {"roughness": 0.0, "dispersion": 2.0}),
 }
 #: cos θ of wo, down to grazing; the sines are float32 numbers or round to 1.
 COSINES = (1.0, 0.6, 0.1, 2.0**-7, 2.0**-10, 2.0**-13)
@@ -150,7 +174,7 @@ def bsdfs(device: Device, materials: list[Material] | None = None, changes: Mapp
 def _values(kind: type[Material]) -> tuple[dict[str, tuple[Any, ...]], ...]:
     """Return the test values of the fields that are numbers, of those that are flags, and of those that are strings."""
     hints = get_type_hints(kind)
-    apart = {name for layer in LAYERS.get(kind.kernel, ()) for name in layer}
+    apart = {name for layer in LAYERS.get(kind.kernel, ()) for name in layer} - {"roughness"}
     names = [field.name for field in fields(kind) if field.name not in SHARED | apart]
     words = {name: tuple(found) for name in names if (found := _words(hints[name]))}
     flags = {name: (False, True) for name in names if bool in (hints[name], *get_args(hints[name]))}
@@ -161,7 +185,8 @@ def _values(kind: type[Material]) -> tuple[dict[str, tuple[Any, ...]], ...]:
 def layered_variants(kind: type[Material]) -> list[Material]:
     """Return each of the material's LAYERS with combinations of numbers, using every second one."""
     some = {name: values[::2] for name, values in _values(kind)[0].items()}
-    return [kind(**values, **layer) for layer in LAYERS.get(kind.kernel, ()) for values in _product(some)]
+    every = [kind(**(values | layer)) for layer in LAYERS.get(kind.kernel, ()) for values in _product(some)]
+    return list(dict.fromkeys(every))
 
 
 def _product(values: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:

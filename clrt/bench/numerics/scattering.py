@@ -68,7 +68,8 @@ def scatter(bsdfs: Bsdfs, which: int, cosine: float, samples: int, seed: int) ->
     through = "TRANSMISSION" in bsdfs.materials[which].features()
     wrong |= np.where(kept, (wi[:, 2] < 0) & (not through), ((wi[:, 2] > 0) & (not through)) | weight.any(axis=1))
     if specular.any():
-        wrong |= (specular == 0) | (len(np.unique(wi, axis=0)) > 1 + through)
+        refracted = 3 if "DISPERSION" in bsdfs.materials[which].features() else int(through)
+        wrong |= (specular == 0) | (len(np.unique(wi, axis=0)) > 1 + refracted)
         wrong[kept] |= value.any(axis=1) | (density != 0)
         return Scattered(name, 1.0, 1.0, 0.0, _energy(weight), 0.0, int(wrong.sum()), True)
     sided = wi[kept, 2] != 0 if through else wi[kept, 2] > 0

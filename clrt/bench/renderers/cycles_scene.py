@@ -150,7 +150,7 @@ def _is_metal(material: MetallicRoughness) -> bool:
     return (
         not np.any(material.lobes.albedo)
         and material.smith == "height_correlated"
-        and not material.features() & {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"}
+        and not material.features() & {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR", "ANISOTROPY", "IRIDESCENCE"}
     )
 
 

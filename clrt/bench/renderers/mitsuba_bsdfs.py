@@ -182,6 +182,8 @@ def _mirror(material: Mirror) -> Plugin:
 def _metallic_roughness(material: MetallicRoughness) -> Plugin:
     """Return `principled`, exactly GGX, Schlick's Fresnel and separable Smith for pure metals; otherwise `gltf`."""
     values, has = material.parameters(), material.features()
+    if unsupported := has & {"ANISOTROPY", "IRIDESCENCE", "DIFFUSE_THROUGH"}:
+        raise ValueError(" and ".join(sorted(unsupported)).lower())
     if (
         material.smith == "separable"
         and values["metallic"] == 1
@@ -236,6 +238,8 @@ def _phong(material: Phong) -> Plugin:
 
 
 def _dielectric(material: Dielectric) -> Plugin:
+    if material.dispersion:
+        raise ValueError("dispersion")
     if material.thin and (material.rough or untextured(material.color) != (1.0, 1.0, 1.0)):
         return {
             "type": "sheet",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from .compressed_views import decompressed
 from .resources import read_uri
-from .schema import Accessor, Document, Sparse, entry, parse_document
+from .schema import Accessor, BufferView, Document, Meshopt, Sparse, entry, parse_document
 
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -25,28 +27,36 @@ Bytes = NDArray[np.uint8]
 class GltfData:
     """Document and bytes of one file. Every method raises SceneError for data that lies out of bounds."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, ignored: Collection[str] = ()) -> None:
         content = path.read_bytes()
         text, self._chunk = split_glb(content) if content.startswith(b"glTF") else (content, None)
-        self.document: Document = parse_document(text)
+        self.document: Document = parse_document(text, ignored)
         self.path = path
         #: Decompressed values of accessors, (count, components), by index; see scene.gltf_draco.
         self.decoded: dict[int, Array] = {}
         self._buffers: dict[int, Bytes] = {}
+        self._decompressed: dict[int, Bytes] = {}
 
     def resource(self, uri: str, user: str) -> bytes:
         """Return the content of a URI, see `read_uri`."""
         return read_uri(self.path, uri, user)
 
     def view(self, index: int, user: str) -> Bytes:
-        """Return the bytes of a buffer view."""
+        """Return the bytes of a buffer view, decompressed if it is compressed."""
         view = entry(self.document.bufferViews, index, "bufferView", user)
-        data = self._buffer(view.buffer, f"bufferView {index}")
+        if (compressed := view.extensions.meshopt) is None:
+            return self._stored(view, f"bufferView {index}")
+        if index not in self._decompressed:
+            stream = self._stored(compressed, f"bufferView {index}")
+            self._decompressed[index] = decompressed(compressed, stream, f"bufferView {index}")
+        return self._decompressed[index]
+
+    def _stored(self, view: BufferView | Meshopt, user: str) -> Bytes:
+        data = self._buffer(view.buffer, user)
         end = view.byteOffset + view.byteLength
         if end > len(data):
             raise SceneError(
-                f"bufferView {index}: ends at byte {end}, but buffer {view.buffer} has {len(data)}; "
-                "export the file again"
+                f"{user}: ends at byte {end}, but buffer {view.buffer} has {len(data)}; export the file again"
             )
         return data[view.byteOffset : end]
 

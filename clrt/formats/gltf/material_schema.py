@@ -35,13 +35,22 @@ class TextureSource(Part):
 
 
 class TextureExtensions(Part):
+    EXT_texture_avif: TextureSource | None = None
     EXT_texture_webp: TextureSource | None = None
+    KHR_texture_basisu: TextureSource | None = None
 
 
 class Texture(Part):
     source: Index | None = None
     sampler: Index | None = None
     extensions: TextureExtensions = TextureExtensions()
+
+    @property
+    def sources(self) -> tuple[int, ...]:
+        """The images to choose from, the one to prefer first: Basis Universal loses most, and needs a decoder."""
+        more, own = self.extensions, None if self.source is None else TextureSource(source=self.source)
+        found = (more.EXT_texture_webp, more.EXT_texture_avif, own, more.KHR_texture_basisu)
+        return tuple(each.source for each in found if each is not None)
 
 
 class TextureTransform(Part):
@@ -77,6 +86,12 @@ class EmissiveStrength(Part):
     emissiveStrength: float = 1.0
 
 
+class Anisotropy(Part):
+    anisotropyStrength: float = 0.0
+    anisotropyRotation: float = 0.0
+    anisotropyTexture: TextureInfo | None = None
+
+
 class Clearcoat(Part):
     clearcoatFactor: float = 0.0
     clearcoatTexture: TextureInfo | None = None
@@ -85,8 +100,28 @@ class Clearcoat(Part):
     clearcoatNormalTexture: NormalTextureInfo | None = None
 
 
+class DiffuseTransmission(Part):
+    diffuseTransmissionFactor: float = 0.0
+    diffuseTransmissionTexture: TextureInfo | None = None
+    diffuseTransmissionColorFactor: Vec3 = (1.0, 1.0, 1.0)
+    diffuseTransmissionColorTexture: TextureInfo | None = None
+
+
+class Dispersion(Part):
+    dispersion: float = 0.0
+
+
 class Ior(Part):
     ior: float = 1.5
+
+
+class Iridescence(Part):
+    iridescenceFactor: float = 0.0
+    iridescenceTexture: TextureInfo | None = None
+    iridescenceIor: float = 1.3
+    iridescenceThicknessMinimum: float = 100.0
+    iridescenceThicknessMaximum: float = 400.0
+    iridescenceThicknessTexture: TextureInfo | None = None
 
 
 class Sheen(Part):
@@ -127,9 +162,13 @@ class Unlit(Part):
 
 
 class MaterialExtensions(Part):
+    KHR_materials_anisotropy: Anisotropy = Anisotropy()
     KHR_materials_clearcoat: Clearcoat = Clearcoat()
+    KHR_materials_diffuse_transmission: DiffuseTransmission = DiffuseTransmission()
+    KHR_materials_dispersion: Dispersion = Dispersion()
     KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
     KHR_materials_ior: Ior = Ior()
+    KHR_materials_iridescence: Iridescence = Iridescence()
     KHR_materials_pbrSpecularGlossiness: SpecularGlossiness | None = None
     KHR_materials_sheen: Sheen = Sheen()
     KHR_materials_specular: Specular = Specular()

@@ -36,10 +36,13 @@ class Materials:
     def __init__(self, data: GltfData, variant: int | None = None) -> None:
         self._data, self._variant = data, variant
         self._names = gltf.unique_names("material", [material.name for material in data.document.materials])
-        self._pictures: dict[int, Picture | None] = {}
+        self._pictures: dict[int, Picture] = {}
+        self._chosen: dict[tuple[int, ...], Picture | None] = {}
         self._derived: dict[tuple[int, float], Picture] = {}
         #: Features that had an effect in the file, but are not rendered, by the material's name.
         self.unused: dict[str, list[str]] = {}
+        #: Textures that could not be read, and why; a warning was logged for each.
+        self.unread: list[str] = []
 
     def name(self, primitive: gltf.Primitive) -> str:
         """Return the name of the primitive's material, empty if it has none."""
@@ -70,7 +73,7 @@ class Materials:
         texture by grey, an emission texture by black.
         """
         index = self._index(primitive)
-        opaque = None if colors is None else colors[:, :3]
+        opaque = colors if colors is None or colors.shape[1] == 3 else colors[:, :3]
         if index is None:
             return [(MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0), faces, opaque)]
         source = converted(gltf.entry(self._data.document.materials, index, "material", user))
@@ -91,6 +94,9 @@ class Materials:
             double_sided=source.doubleSided,
             **self._gloss(source, primitive, user),
             **self._layers(extensions, primitive, user),
+            **self._diffuse_transmission(extensions.KHR_materials_diffuse_transmission, primitive, user),
+            **self._thin_film(extensions.KHR_materials_iridescence, primitive, user),
+            **self._anisotropy(index, extensions.KHR_materials_anisotropy, primitive, user),
         )
         made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
         solid = solid_faces(extensions, made, uv, faces)
@@ -98,11 +104,17 @@ class Materials:
         if not solid.all():
             parts.append((replace(tinted(extensions, made), **coverage), faces[~solid], colors))
             volume = extensions.KHR_materials_volume.thicknessFactor > 0
-            self._note(index, {"volume": volume and made.transmission != 0 and made.metallic != 1})
+            transmits = made.transmission != 0 or made.diffuse_transmission != 0
+            self._note(index, {"volume": volume and transmits and made.metallic != 1})
         if solid.any():
             parts.append((glass(extensions, made), faces[solid], opaque))
-            layers = {layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR")}
-            self._note(index, {"alphaMode": coverage.get("opacity", 1.0) != 1 or colors is not opaque, **layers})
+            layers = {
+                layer.lower(): layer in made.features()
+                for layer in ("CLEARCOAT", "SHEEN", "SPECULAR", "ANISOTROPY", "IRIDESCENCE")
+            }
+            faded = coverage.get("opacity", 1.0) != 1 or colors is not opaque
+            dispersion = extensions.KHR_materials_dispersion.dispersion > 0 and made.roughness != 0
+            self._note(index, {"alphaMode": faded, **layers, "dispersion of rough glass": dispersion})
         return parts
 
     def _note(self, index: int, lost: Mapping[str, bool]) -> None:
@@ -161,6 +173,51 @@ class Materials:
             "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red"),
         }
 
+    def _diffuse_transmission(
+        self, source: looks.DiffuseTransmission, primitive: gltf.Primitive, user: str
+    ) -> dict[str, Any]:
+        """Return the fields of diffuse transmission."""
+        part = _unit(source.diffuseTransmissionFactor)
+        if part == 0:
+            return {}
+        info = source.diffuseTransmissionColorTexture
+        color = _cut(source.diffuseTransmissionColorFactor)
+        return {
+            "diffuse_transmission": _numbered(
+                part, self._texture(source.diffuseTransmissionTexture, primitive, user), "alpha"
+            ),
+            "diffuse_transmission_color": _colored(color, self._texture(info, primitive, user), info, 1.0),
+        }
+
+    def _thin_film(self, source: looks.Iridescence, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
+        """Return the fields of iridescence."""
+        strength = _unit(source.iridescenceFactor)
+        if strength == 0:
+            return {}
+        thickness = self._texture(source.iridescenceThicknessTexture, primitive, user)
+        return {
+            "iridescence": _numbered(strength, self._texture(source.iridescenceTexture, primitive, user), "red"),
+            "iridescence_ior": float(np.clip(source.iridescenceIor, 1, MOST_IOR)),
+            "iridescence_thickness": max(source.iridescenceThicknessMaximum, 0.0),
+            "iridescence_thickness_minimum": max(source.iridescenceThicknessMinimum, 0.0),
+            "iridescence_thickness_map": _numbered(1.0, thickness, "green"),
+        }
+
+    def _anisotropy(self, index: int, source: looks.Anisotropy, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
+        """Return the fields of anisotropy, which needs tangents or texture coordinates."""
+        strength = _unit(source.anisotropyStrength)
+        if strength == 0:
+            return {}
+        if not {"TANGENT", "TEXCOORD_0", "TEXCOORD_1"} & set(primitive.attributes):
+            self._note(index, {"anisotropy": True})
+            return {}
+        directions = self._texture(source.anisotropyTexture, primitive, user)
+        return {
+            "anisotropy": _numbered(strength, directions, "blue"),
+            "anisotropy_degrees": math.degrees(source.anisotropyRotation),
+            "anisotropy_map": directions,
+        }
+
     def _bend(self, info: looks.NormalTextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
         """Return a normal map; a negative scale tilts to the other side."""
         texture = self._texture(info, primitive, user)
@@ -187,9 +244,7 @@ class Materials:
         if uv_set > 1 or f"TEXCOORD_{uv_set}" not in primitive.attributes:
             log.warning("%s: %s has no texture coordinates %d; its texture is left out", self._data.path, user, uv_set)
             return None
-        webp = texture.extensions.EXT_texture_webp
-        source = texture.source if webp is None else webp.source
-        picture = None if source is None else self._picture(source, f"texture {info.index}")
+        picture = self._first_picture(texture.sources, f"texture {info.index}")
         if picture is None:
             return None
         sampler = looks.Sampler()
@@ -206,20 +261,31 @@ class Materials:
             filter="nearest" if sampler.magFilter == NEAREST else "linear",
         )
 
-    def _picture(self, index: int, user: str) -> Picture | None:
-        """Return an image; None, with a warning, if it cannot be read."""
+    def _first_picture(self, sources: tuple[int, ...], user: str) -> Picture | None:
+        """Return the first of these images that can be read; None, with a warning, if none can."""
+        if not sources or sources in self._chosen:
+            return self._chosen.get(sources)
+        faults = list[str]()
+        self._chosen[sources] = None
+        for index in sources:
+            try:
+                self._chosen[sources] = self._picture(index, user)
+                return self._chosen[sources]
+            except SceneError as error:
+                faults.append(str(error))
+        self.unread.append(f"a texture: {'; '.join(faults)}")
+        log.warning("%s: a texture is left out: %s", self._data.path, "; ".join(faults))
+        return None
+
+    def _picture(self, index: int, user: str) -> Picture:
         if index not in self._pictures:
             image = gltf.entry(self._data.document.images, index, "image", user)
-            try:
-                content = (
-                    self._data.resource(image.uri or "", user)
-                    if image.bufferView is None
-                    else self._data.view(image.bufferView, user).tobytes()
-                )
-                self._pictures[index] = Picture(read_texels(content, f"image {index}"), image.name or f"image {index}")
-            except SceneError as error:
-                log.warning("%s: a texture is left out: %s", self._data.path, error)
-                self._pictures[index] = None
+            content = (
+                self._data.resource(image.uri or "", user)
+                if image.bufferView is None
+                else self._data.view(image.bufferView, user).tobytes()
+            )
+            self._pictures[index] = Picture(read_texels(content, f"image {index}"), image.name or f"image {index}")
         return self._pictures[index]
 
 

@@ -65,7 +65,7 @@ class GltfFile:
 
     def __init__(self, path: Path, normals: Normals, choice: ModelChoice) -> None:
         self._path, self._choice = path, choice
-        self._data = GltfData(path)
+        self._data = GltfData(path, choice.ignore_extensions or ())
         document = self._data.document
         variants = document.extensions.KHR_materials_variants.variants
         self._names = {
@@ -85,10 +85,9 @@ class GltfFile:
         clip, name, left_out = self._clip()
         asked = clip if self._choice.animated else None
         model, cameras = self._posed(asked, self._choice.time or 0.0)
-        self._warn([*left_out, *cameras, *(asked.ignored if asked else [])])
+        model.contents = self._contents([*left_out, *cameras, *(asked.ignored if asked else [])])
         if model.lights and self._choice.light_unit is None and self._unit != "radiometric":
             model.converted_from = self._unit
-        model.contents = self._names
         if clip is not None and self._choice.time is None:
             base = replace(model, meshes=list(model.meshes), instances=list(model.instances), lights=list(model.lights))
             model.animation = ModelAnimation(name=name, seconds=clip.seconds, base=base, pose=partial(self._at, clip))
@@ -153,13 +152,25 @@ class GltfFile:
             yield from ((mesh, np.eye(4)) for mesh in bent)
         self._shapes = shapes
 
-    def _warn(self, left_out: Iterable[str]) -> None:
-        """Log one warning that lists what is not rendered."""
+    def _contents(self, others: Iterable[str]) -> dict[str, list[str]]:
+        """Return what the file has by kind, see `Model`, and log one warning that lists what is not rendered.
+
+        others: descriptions of what is left out and why.
+        """
         document = self._data.document
         primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
-        names = ["points and lines"] if any(primitive.mode < TRIANGLES for primitive in primitives) else []
+        why = {"points and lines": "only triangles are rendered"}
+        left_out = why if any(primitive.mode < TRIANGLES for primitive in primitives) else {}
         used = {*document.extensionsUsed, *document.extensionsRequired}
-        names += sorted(f"the extension {name}" for name in used - gltf.EXTENSIONS)
-        names += [f'{" and ".join(features)} of material "{name}"' for name, features in self._materials.unused.items()]
-        if names := [*names, *left_out]:
-            log.warning("%s: left out: %s", self._path, ", ".join(names))
+        left_out |= {f"the extension {name}": "is not supported" for name in sorted(used - gltf.EXTENSIONS)}
+        for name, features in self._materials.unused.items():
+            left_out[f'{" and ".join(features)} of material "{name}"'] = "is not rendered with its other features"
+        left_out |= dict.fromkeys(others, "")
+        if left_out:
+            log.warning("%s: left out: %s", self._path, ", ".join(left_out))
+        reasons = [": ".join(filter(None, pair)) for pair in left_out.items()]
+        return {
+            **self._names,
+            "extensions": sorted(used & gltf.EXTENSIONS),
+            "left_out": [*reasons, *self._materials.unread],
+        }

@@ -6,7 +6,7 @@ Imported only when a glTF file is read, since it needs pydantic. Unknown propert
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field, ValidationError
@@ -26,9 +26,13 @@ BOM = b"\xef\xbb\xbf"
 EXTENSIONS = frozenset(
     f"KHR_materials_{name}"
     for name in (
+        "anisotropy",
         "clearcoat",
+        "diffuse_transmission",
+        "dispersion",
         "emissive_strength",
         "ior",
+        "iridescence",
         "pbrSpecularGlossiness",
         "sheen",
         "specular",
@@ -40,11 +44,15 @@ EXTENSIONS = frozenset(
 ) | frozenset(
     {
         "EXT_mesh_gpu_instancing",
+        "EXT_meshopt_compression",
+        "EXT_texture_avif",
         "EXT_texture_webp",
         "KHR_draco_mesh_compression",
         "KHR_lights_punctual",
         "KHR_mesh_quantization",
+        "KHR_meshopt_compression",
         "KHR_node_visibility",
+        "KHR_texture_basisu",
         "KHR_texture_transform",
     }
 )
@@ -66,11 +74,31 @@ class Buffer(Part):
     uri: str | None = None
 
 
+class Meshopt(Part):
+    buffer: Index
+    byteLength: Count
+    byteStride: Count
+    count: Count
+    mode: Literal["ATTRIBUTES", "TRIANGLES", "INDICES"]
+    byteOffset: Index = 0
+    filter: Literal["NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"] = "NONE"
+
+
+class BufferViewExtensions(Part):
+    EXT_meshopt_compression: Meshopt | None = None
+    KHR_meshopt_compression: Meshopt | None = None
+
+    @property
+    def meshopt(self) -> Meshopt | None:
+        return self.KHR_meshopt_compression or self.EXT_meshopt_compression
+
+
 class BufferView(Part):
     buffer: Index
     byteLength: Count
     byteOffset: Index = 0
     byteStride: Annotated[int, Field(ge=4, le=252)] | None = None
+    extensions: BufferViewExtensions = BufferViewExtensions()
 
 
 class SparseIndices(Part):
@@ -265,9 +293,9 @@ class Document(Part):
     extensions: DocumentExtensions = DocumentExtensions()
 
 
-def parse_document(text: bytes) -> Document:
+def parse_document(text: bytes, ignored: Collection[str] = ()) -> Document:
     """Parse a JSON text. Raises SceneError with every property that the specification does not allow, for a version
-    other than 2, and for a required extension that is in neither EXTENSIONS nor OPTIONAL."""
+    other than 2, and for a required extension that is in neither EXTENSIONS nor OPTIONAL nor `ignored`."""
     try:
         document = Document.model_validate_json(text.removeprefix(BOM))
     except ValidationError as error:
@@ -277,9 +305,14 @@ def parse_document(text: bytes) -> Document:
         ) from None
     if not document.asset.version.startswith("2."):
         raise SceneError(f'asset.version is "{document.asset.version}"; only glTF 2 is supported, export it as 2.0')
-    missing = [name for name in sorted(set(document.extensionsRequired) - EXTENSIONS) if not OPTIONAL.match(name)]
+    unknown = sorted(set(document.extensionsRequired) - EXTENSIONS - set(ignored))
+    missing = [name for name in unknown if not OPTIONAL.match(name)]
     if missing:
-        raise SceneError(f"needs the extension {', '.join(missing)}, which is not supported; export without it")
+        options = " ".join(f"--ignore-extension {name}" for name in missing)
+        raise SceneError(
+            f"needs the extension {', '.join(missing)}, which is not supported; export without it, or read what is "
+            f"supported ({options}; in a scene file ignore_extensions)"
+        )
     return document
 
 

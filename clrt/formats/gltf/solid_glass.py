@@ -26,6 +26,7 @@ def glass(extensions: MaterialExtensions, made: MetallicRoughness) -> Dielectric
         emission=made.emission,
         normal_map=made.normal_map,
         double_sided=made.double_sided,
+        dispersion=max(extensions.KHR_materials_dispersion.dispersion, 0.0) if made.roughness == 0 else 0.0,
         attenuation_color=_attenuation(extensions),
         attenuation_distance=distance if distance is not None and distance > 0 else None,
     )

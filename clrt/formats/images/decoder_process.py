@@ -39,6 +39,12 @@ def fits(decoded: int, stored: int) -> bool:
     return decoded <= min(MOST_BYTES, max(FREE_BYTES, MOST_RATIO * stored))
 
 
+def check_size(file: str, width: int, height: int, decoded: int) -> None:
+    """Raise ValueError if an image of so many bytes may not come from this file."""
+    if not fits(decoded, os.path.getsize(file)):
+        raise ValueError(f"{os.path.getsize(file)} bytes cannot contain {width}x{height} pixels")
+
+
 def picture(file: str) -> Found:
     """Return an image's pixels, (h, w, c) uint8, uint16 or float32 as stored, with unassociated alpha: red, green and
     blue, or grey, then alpha if there is any. They fill the display window, and are black outside of the data window.
@@ -60,8 +66,7 @@ def picture(file: str) -> Found:
     dtype = _dtype(spec, channels)
     area = max(spec.width * spec.height, spec.full_width * spec.full_height)
     first, last = min(channels), max(channels) + 1
-    if not fits(area * (last - first) * dtype.itemsize, os.path.getsize(file)):
-        raise ValueError(f"{os.path.getsize(file)} bytes cannot contain {spec.width}x{spec.height} pixels")
+    check_size(file, spec.width, spec.height, area * (last - first) * dtype.itemsize)
     kind = getattr(oiio, "FLOAT" if dtype == np.float32 else dtype.name.upper())
     buffer = _opened(file, chosen.part)
     pixels = buffer.get_pixels(kind) if buffer.read(chosen.part, 0, first, last, True, kind) else None
@@ -137,7 +142,27 @@ def draco(file: str) -> Found:
     }, {}
 
 
-KINDS: dict[str, Callable[[str], Found]] = {"picture": picture, "draco": draco}
+def avif(file: str) -> Found:
+    """Decode an AVIF image to 8 bits per channel; pixels and facts as those of `picture`."""
+    from PIL import Image, features
+
+    if not features.check("avif"):
+        return {}, {"refused": "is an AVIF image, which this version of Pillow cannot read; pip install 'pillow>=11.3'"}
+    with Image.open(file) as image:
+        check_size(file, image.width, image.height, 4 * image.width * image.height)
+        return {"pixels": np.asarray(image.convert("RGBA"))}, {"channels": "RGBA"}
+
+
+def basis(file: str) -> Found:
+    """Decode a KTX 2 image of Basis Universal; pixels and facts as those of `picture`."""
+    import opengl_basisu
+
+    image = opengl_basisu.open(file)
+    check_size(file, image.width, image.height, 4 * image.width * image.height)
+    return {"pixels": image.transcode("rgba8").data}, {"channels": "RGBA"}
+
+
+KINDS: dict[str, Callable[[str], Found]] = {"picture": picture, "draco": draco, "avif": avif, "basis": basis}
 
 
 def main() -> None:

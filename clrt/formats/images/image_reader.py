@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,16 @@ from ..referenced_files import check_file
 from .decoder import decode
 from .radiance_hdr import read_radiance
 
-#: Magic bytes of images embedded in glTF, and the file suffix of that format.
-EMBEDDED = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg", b"RIFF": ".webp"}
+#: Magic bytes of images embedded in glTF, with their position, and the file suffix of that format.
+EMBEDDED = {
+    (0, b"\x89PNG\r\n\x1a\n"): ".png",
+    (0, b"\xff\xd8\xff"): ".jpg",
+    (0, b"RIFF"): ".webp",
+    (4, b"ftypavif"): ".avif",
+    (0, b"\xabKTX 20\xbb\r\n\x1a\n"): ".ktx2",
+}
+#: Decoders by suffix, for formats that OpenImageIO does not decode.
+DECODERS = {".avif": "avif", ".ktx2": "basis"}
 
 
 def read_picture(path: StrPath) -> NDArray[np.float32]:
@@ -37,7 +46,8 @@ def read_picture(path: StrPath) -> NDArray[np.float32]:
 
 
 def read_texels(source: StrPath | bytes, name: str = "") -> NDArray[np.uint8]:
-    """Return the texels of an image file of at most 16 bits per channel, or of the bytes of one (PNG, JPEG, WebP).
+    """Return the texels of an image file of at most 16 bits per channel, or of the bytes of one (PNG, JPEG, WebP,
+    AVIF, KTX 2 of Basis Universal).
 
     (h, w, 4) uint8 as stored, row 0 on top, unassociated alpha. `name`: the bytes' name in messages. Raises SceneError
     as `read_picture`, and for images of floats, which would lose most of their range.
@@ -68,11 +78,16 @@ def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], str]:
     """Return the pixels as stored, and their channels: RGB, RGBA, Y or YA."""
     suffix = ""
     if isinstance(source, bytes):
-        suffix = next((ending for start, ending in EMBEDDED.items() if source.startswith(start)), "")
+        suffix = next((ending for (start, magic), ending in EMBEDDED.items() if source.startswith(magic, start)), "")
         if not suffix:
-            raise SceneError(f"{name}: is not a PNG, JPEG or WebP image; convert it")
+            raise SceneError(f"{name}: is not a PNG, JPEG, WebP, AVIF or KTX 2 image; convert it")
+    if suffix == ".ktx2" and find_spec("opengl_basisu") is None:
+        raise SceneError(
+            f"{name}: is compressed with Basis Universal, whose decoder is not installed; "
+            "pip install opengl-basisu, or export the textures as PNG or JPEG"
+        )
     try:
-        arrays, facts = decode("picture", source, suffix)
+        arrays, facts = decode(DECODERS.get(suffix, "picture"), source, suffix)
     except SceneError as error:
         raise SceneError(f"{name}: cannot be decoded as an image: {error}") from None
     if "refused" in facts:

@@ -48,6 +48,7 @@ class MeshTable(Transform):
     crease_degrees: Annotated[float, Ge(0), Le(180)] | None = None
     lights: bool = False
     light_unit: LightUnit | None = None
+    ignore_extensions: tuple[str, ...] | None = None
     visible: bool = True
     up: Axis = "y"
     unit: Unit = "m"
@@ -84,7 +85,12 @@ class MeshTable(Transform):
         # In a scene file the model is a still.
         time = 0.0 if self.animation is not None and self.time is None else self.time
         choice = ModelChoice(
-            scene=self.scene, variant=self.variant, animation=self.animation, time=time, light_unit=self.light_unit
+            scene=self.scene,
+            variant=self.variant,
+            animation=self.animation,
+            time=time,
+            light_unit=self.light_unit,
+            ignore_extensions=self.ignore_extensions,
         )
         if self.file is not None:
             return self._from_file(self.file, choice, folder, where)

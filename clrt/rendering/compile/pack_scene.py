@@ -146,7 +146,7 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: R
     emitters = pack_emitters(shapes.scene, sky, textures)
     materials = pack_materials(shapes.users, textures, tables, scene.render.back_face_culling)
     buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, normals, tree is not NO_RAYS)
-    buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.normal_maps)
+    buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.tangents)
     buffers |= materials.buffers | tables.buffers() | textures.buffers() | emitters.buffers | sky.buffers
     if scene.render.filter != "box":
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))

@@ -98,7 +98,7 @@ class Material:
 
     @property
     def bent_by(self) -> Texture | None:
-        """The normal map whose texture coordinates its tangents follow, if it has one."""
+        """The texture, such as a normal map, whose coordinates its tangents follow, if it needs them."""
         return self.normal_map
 
     def textures(self) -> list[Texture]:

@@ -16,7 +16,7 @@ from .dielectric_energy import ROWS, tables
 from .material import Albedo as Albedo, Material as Material, Parameter, Unit
 from .metallic_roughness import MetallicRoughness as MetallicRoughness
 from .presets import CONDUCTORS, ConductorPreset
-from .textures import Texture
+from .textures import NonNegative, Texture
 
 Index = Annotated[float, Ge(0.01), Le(100)]
 Extinction = Annotated[float, Ge(0), Le(100)]
@@ -78,18 +78,21 @@ class Dielectric(Material):
     - roughness: of the surface, with alpha = roughness² of the GGX distribution; 0 is smooth
     - multiple_scattering: compensates the energy that single scattering between microfacets loses, so that rough glass
       loses no light
+    - dispersion: 20 over the Abbe number of smooth glass: red, green and blue have indices of refraction of their own
+      (glTF's KHR_materials_dispersion); `ior` is that of green
     - thin: a sheet without an interior, which does not bend light and transmits `color` from face to face
     - attenuation_color, attenuation_distance: inside others light is attenuated to this color per this distance, in
       scene units (glTF's KHR_materials_volume; None: no attenuation)
     """
 
     kernel: ClassVar[str] = "dielectric"
-    parts: ClassVar[tuple[str, ...]] = ("ROUGH_DIELECTRIC", "DIELECTRIC_ENERGY")
+    parts: ClassVar[tuple[str, ...]] = ("ROUGH_DIELECTRIC", "DIELECTRIC_ENERGY", "DISPERSION")
     color: Albedo | Texture = (1.0, 1.0, 1.0)
     ior: Annotated[float, Ge(0.25), Le(4)] = 1.5
     roughness: Unit | Texture = 0.0
     multiple_scattering: bool = True
     thin: bool = False
+    dispersion: NonNegative = 0.0
     attenuation_color: Albedo = (1.0, 1.0, 1.0)
     attenuation_distance: Annotated[float, Gt(0)] | None = None
 
@@ -102,6 +105,8 @@ class Dielectric(Material):
             values |= {"energy": tables(self.ior, one, self.thin), "last_row": ROWS - 1.0 if one is None else 0.0}
         if self.thin:
             values["thin"] = 1.0
+        if self.dispersion:
+            values["dispersion"] = self.dispersion
         if (distance := self.attenuation_distance) is not None:
             values["absorption"] = tuple(
                 min(-log(max(part, BLACK)) / distance, 1 / BLACK) for part in self.attenuation_color
@@ -124,7 +129,10 @@ class Dielectric(Material):
 
     def conflicts(self) -> list[str]:
         fault = "attenuation_distance: a thin surface has no interior; leave it out, or remove thin"
-        return [fault] if self.thin and self.attenuation_distance is not None else []
+        faults = [fault] if self.thin and self.attenuation_distance is not None else []
+        if self.dispersion and (self.rough or self.thin):
+            faults.append("dispersion: is for solid glass with roughness = 0; write dispersion = 0")
+        return faults
 
     def in_unit(self, unit: float) -> Dielectric:
         distance = self.attenuation_distance
@@ -138,6 +146,7 @@ class Dielectric(Material):
             "DIELECTRIC_ENERGY": self.scatters_again,
             "THIN_DIELECTRIC": self.thin,
             "ATTENUATION": self.attenuation_distance is not None,
+            "DISPERSION": self.dispersion != 0,
         }
         return frozenset(name for name, present in has.items() if present)
 

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import cos, radians, sin
 from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
 from ..fields.limits import Ge, Le
-from . import layer_energy
+from . import anisotropy_energy, layer_energy
 from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
 from .presets import F0_PRESETS, Preset
-from .textures import Texture
+from .textures import WHITE, NonNegative, Texture
 
 Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
 Coupling = Literal["albedo", "fresnel", "half_vector"]
+#: Fields of the thin film.
+FILM = (
+    "iridescence",
+    "iridescence_ior",
+    "iridescence_thickness",
+    "iridescence_thickness_minimum",
+    "iridescence_thickness_map",
+)
+#: Stands for a texture where only the tangent along u is needed.
+ALONG_U = Texture(picture=WHITE)
 
 
 class Lobes(NamedTuple):
@@ -41,7 +52,12 @@ class MetallicRoughness(Material):
     The rest are glTF's extensions, with their names. `ior`, `specular` and `specular_color`: F0 of the dielectric part,
     ((ior − 1)/(ior + 1))²·specular·specular_color, and F at grazing angles, `specular`. `clearcoat`: a clear film,
     affected by `clearcoat_normal_map` alone. `sheen_color`: fibres. `transmission`: the fraction of the dielectric part
-    that is a thin transmissive sheet.
+    that is a thin transmissive sheet. `anisotropy`: alpha along a direction on the surface is mix(alpha, 1,
+    anisotropy²): along the tangent, turned by `anisotropy_degrees` counter-clockwise, or along the directions of
+    `anisotropy_map`, red and green from −1 to 1, turned likewise. `iridescence`: the fraction of the surface with a
+    thin film of `iridescence_ior`, whose thickness in nanometers is `iridescence_thickness`, or where the map is 0
+    `iridescence_thickness_minimum`. `diffuse_transmission`: the fraction of the diffuse lobe that instead transmits
+    `diffuse_transmission_color` to the other side.
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
@@ -49,6 +65,9 @@ class MetallicRoughness(Material):
         "LAYERS",
         "LAYER_ENERGY",
         "SHEEN",
+        "IRIDESCENCE",
+        "ANISOTROPY",
+        "ANISOTROPY_ALBEDO",
         "GGX_ALBEDO",
         *(f"ALBEDO_{smith.upper()}" for smith in get_args(Smith)),
     )
@@ -68,6 +87,16 @@ class MetallicRoughness(Material):
     sheen_color: Albedo | Texture = (0.0, 0.0, 0.0)
     sheen_roughness: Unit | Texture = 0.0
     transmission: Unit | Texture = 0.0
+    anisotropy: Unit | Texture = 0.0
+    anisotropy_degrees: float = 0.0
+    anisotropy_map: Texture | None = None
+    diffuse_transmission: Unit | Texture = 0.0
+    diffuse_transmission_color: Albedo | Texture = (1.0, 1.0, 1.0)
+    iridescence: Unit | Texture = 0.0
+    iridescence_ior: Annotated[float, Ge(1), Le(4)] = 1.3
+    iridescence_thickness: NonNegative = 400.0
+    iridescence_thickness_minimum: NonNegative = 100.0
+    iridescence_thickness_map: Unit | Texture = 1.0
 
     def parameters(self) -> dict[str, Parameter]:
         color, f0, metallic = self.color, (((self.ior - 1) / (self.ior + 1)) ** 2,) * 3, self.metallic
@@ -105,7 +134,33 @@ class MetallicRoughness(Material):
                 "layer_energy": layer_energy.tables(*rows, self.smith),
                 "last_rows": tuple(len(each) - 1.0 for each in rows),
             }
+        if "ANISOTROPY" in has:
+            values |= self._anisotropic("ANISOTROPY_ALBEDO" in has)
+        if "DIFFUSE_THROUGH" in has:
+            values |= {
+                "diffuse_transmission": self.diffuse_transmission,
+                "diffuse_transmission_color": self.diffuse_transmission_color,
+            }
+        if "IRIDESCENCE" in has:
+            values |= {name: getattr(self, name) for name in FILM}
         return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
+
+    def _anisotropic(self, with_albedo: bool) -> dict[str, Parameter]:
+        """Return the parameters of anisotropy."""
+        values: dict[str, Parameter] = {
+            "anisotropy": self.anisotropy,
+            "anisotropy_cos": cos(radians(self.anisotropy_degrees)),
+            "anisotropy_sin": sin(radians(self.anisotropy_degrees)),
+        }
+        if self.anisotropy_map is not None:
+            values["anisotropy_map"] = self.anisotropy_map
+        if with_albedo:
+            textured = isinstance(self.anisotropy, Texture) or isinstance(self.roughness, Texture)
+            values["anisotropy_energy"] = anisotropy_energy.tables(
+                *((None, None) if textured else (self.roughness, self.anisotropy))
+            )
+            values["anisotropy_last_row"] = anisotropy_energy.ROWS - 1.0 if textured else 0.0
+        return values
 
     def _roughnesses(self, has: frozenset[str]) -> tuple[Unit | Texture, ...]:
         """Return the roughnesses of base, film and fibres; for an absent layer, any number."""
@@ -117,7 +172,20 @@ class MetallicRoughness(Material):
 
     @property
     def bent_by(self) -> Texture | None:
+        along = (self.anisotropy_map, self.anisotropy, ALONG_U) if self.anisotropy != 0 else ()
+        return self._normal_map or next((texture for texture in along if isinstance(texture, Texture)), None)
+
+    @property
+    def _normal_map(self) -> Texture | None:
         return self.normal_map or (self.clearcoat_normal_map if self.clearcoat != 0 else None)
+
+    def conflicts(self) -> list[str]:
+        fault = 'anisotropy: is for smith = "height_correlated"; leave smith out, or write anisotropy = 0'
+        faults = [fault] if self.anisotropy != 0 and self.smith != "height_correlated" else []
+        coupled = [name for name in ("iridescence", "diffuse_transmission") if getattr(self, name) != 0]
+        if self.coupled_by != "albedo":
+            faults += [f'{name}: is for coupling = "albedo"; write that, or {name} = 0' for name in coupled]
+        return faults
 
     @property
     def lobes(self) -> Lobes:
@@ -140,6 +208,7 @@ class MetallicRoughness(Material):
             "CLEARCOAT": self.clearcoat != 0,
             "SHEEN": self.sheen_color != (0, 0, 0),
             "THROUGH": self.transmission != 0,
+            "DIFFUSE_THROUGH": self.diffuse_transmission != 0 and metallic != 1,
         }
         further = self.coupled_by == "albedo" if self.multiple_scattering is None else self.multiple_scattering
         # With the albedo coupling the diffuse lobe reflects what the specular one does not, so only metal loses energy.
@@ -157,13 +226,17 @@ class MetallicRoughness(Material):
             "GGX_ALBEDO": bool(forms),
             **layers,
             **{f"ALBEDO_{form.upper()}": True for form in forms},
-            "COAT_NORMALS": layers["CLEARCOAT"] and self.bent_by is not None,
+            "COAT_NORMALS": layers["CLEARCOAT"] and self._normal_map is not None,
             "LAYERS": any(layers.values()),
             "LAYER_ENERGY": above,
             "LAYER_ROWS": above
             and any(isinstance(r, Texture) for r in (self.roughness, self.clearcoat_roughness, self.sheen_roughness)),
+            "IRIDESCENCE": self.iridescence != 0,
+            "ANISOTROPY": self.anisotropy != 0,
+            "ANISOTROPY_ALBEDO": self.anisotropy != 0 and bool(forms),
+            "ANISOTROPY_MAP": self.anisotropy != 0 and self.anisotropy_map is not None,
             "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
-            "TRANSMISSION": layers["THROUGH"],
-            "TRANSMISSION_LOBES": layers["THROUGH"],
+            "TRANSMISSION": layers["THROUGH"] or layers["DIFFUSE_THROUGH"],
+            "TRANSMISSION_LOBES": layers["THROUGH"] or layers["DIFFUSE_THROUGH"],
         }
         return frozenset(name for name, present in has.items() if present)

@@ -14,7 +14,7 @@ from ..records import COLORS, TANGENTS, TEXCOORDS
 from .pack_geometry import put_corners
 
 
-def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dict[str, tuple[str, NDArray[Any]]]:
+def pack_corners(meshes: Sequence[Mesh], uv_sets: int, with_tangents: bool) -> dict[str, tuple[str, NDArray[Any]]]:
     """Return the buffers texcoords (a record per triangle and UV set), colors and tangents, as far as they are needed.
 
     Attributes that a mesh lacks are 0, or white for colors.
@@ -22,7 +22,7 @@ def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dic
     count = sum(len(mesh.faces) for mesh in meshes)
     texcoords = np.zeros((count, uv_sets), TEXCOORDS)
     colors = np.ones((count if any(mesh.colors is not None for mesh in meshes) else 0, 3, 4), np.float32)
-    tangents = np.zeros(count if normal_maps else 0, TANGENTS)
+    tangents = np.zeros(count if with_tangents else 0, TANGENTS)
     first = 0
     for mesh in meshes:
         own = slice(first, first + len(mesh.faces))
@@ -31,7 +31,7 @@ def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dic
                 put_corners(texcoords[own, i], "uv", uv, mesh.faces)
         if mesh.colors is not None:
             colors[own, :, : mesh.colors.shape[1]] = mesh.colors[mesh.faces]
-        if mesh.material.bent_by is not None and normal_maps:
+        if mesh.material.bent_by is not None and with_tangents:
             tangent, sign = corner_tangents(mesh, mesh.material.bent_by)
             for i in range(3):
                 tangents[f"t{i}"][own] = tangent[:, i]

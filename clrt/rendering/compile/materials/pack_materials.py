@@ -49,6 +49,11 @@ class PackedMaterials:
         """Whether there are normal maps, on surfaces or on their coats."""
         return bool(self.mapped("normal_map") or self.mapped("clearcoat_normal_map"))
 
+    @property
+    def tangents(self) -> bool:
+        """Whether materials need the tangents of surfaces."""
+        return self.normal_maps or bool(self.featured("ANISOTROPY"))
+
 
 class MaterialTables:
     """Tables of all materials, without duplicates."""
