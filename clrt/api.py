@@ -37,6 +37,7 @@ def load(
     animation: str | int | None = None,
     time: float | None = None,
     light_unit: LightUnit | None = None,
+    approximate: bool = False,
 ) -> Scene:
     """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (.glb .gltf .obj .ply .stl .off).
 
@@ -50,10 +51,13 @@ def load(
     lux, "radiometric" for W/sr and W/m², "blender" for watts; by default as the file's generator and their brightness
     suggest.
 
+    approximate: of a Mitsuba scene, what clrt lacks is replaced by something similar or left out, with a warning each,
+    instead of an error.
+
     Raises SceneError, which lists all problems.
     """
     choice = ModelChoice(scene=scene, variant=variant, animation=animation, time=time, light_unit=light_unit)
-    return _load(path, camera, up, unit, choice)
+    return _load(path, camera, up, unit, choice, approximate=approximate)
 
 
 @listed(RendererOptions, SETTINGS)

@@ -56,6 +56,13 @@ class LoadOptions:
         "program that wrote the file, and by the lights' brightness.",
     )
 
+    approximate: bool = flag(
+        "--approximate",
+        default=False,
+        is_flag=True,
+        help="Replace what clrt lacks of a Mitsuba scene by something similar, or leave it out, with a warning each.",
+    )
+
     def load(self, path: Path, moving: bool = False) -> Scene:
         """Load the scene or model. moving: whether its animation is rendered. Raises SceneError."""
         from ..formats.load_scene import load
@@ -68,4 +75,4 @@ class LoadOptions:
             time=self.animation_time,
             light_unit=self.light_unit,
         )
-        return load(path, self.camera, self.up, self.unit, choice, moving)
+        return load(path, self.camera, self.up, self.unit, choice, moving, self.approximate)

@@ -9,12 +9,19 @@
 struct conductor {
     real3 eta, k;
     real alpha;
+#if TINTED_CONDUCTOR
+    real3 reflectance;
+#endif
 };
 
 static inline struct conductor conductor_at(const Scene *scene, ireal index, const Surface *surface) {
     real roughness = PARAMETER(conductor, roughness);
     return (struct conductor){PARAMETER3(conductor, eta), PARAMETER3(conductor, k),
-                              maximum(roughness * roughness, (real)(ALPHA_MIN))};
+                              maximum(roughness * roughness, (real)(ALPHA_MIN))
+#if TINTED_CONDUCTOR
+                              , PARAMETER3(conductor, reflectance)
+#endif
+    };
 }
 
 // F for unpolarised light from vacuum (Born and Wolf, 14.2), with a² + b² = |n² − sin²| for n = eta + i·k. The smaller
@@ -31,8 +38,13 @@ static inline real fresnel_conductor(real cos_o, real eta, real k) {
 }
 
 static inline real3 conductor_fresnel(const struct conductor *m, real cos_o) {
-    return vector(fresnel_conductor(cos_o, m->eta.x, m->k.x), fresnel_conductor(cos_o, m->eta.y, m->k.y),
-                  fresnel_conductor(cos_o, m->eta.z, m->k.z));
+#if TINTED_CONDUCTOR
+#define TINTED(f) mul(m->reflectance, f)
+#else
+#define TINTED(f) f
+#endif
+    return TINTED(vector(fresnel_conductor(cos_o, m->eta.x, m->k.x), fresnel_conductor(cos_o, m->eta.y, m->k.y),
+                         fresnel_conductor(cos_o, m->eta.z, m->k.z)));
 }
 
 static inline BsdfValue conductor_eval(const struct conductor *m, real3 wo, real3 wi) {

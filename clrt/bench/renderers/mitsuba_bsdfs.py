@@ -260,6 +260,7 @@ def _dielectric(material: Dielectric) -> Plugin:
 def _conductor(material: Conductor) -> Plugin:
     values = material.parameters()
     plugin = {"type": "roughconductor", "eta": rgb(values["eta"]), "k": rgb(values["k"])}
+    plugin |= {"specular_reflectance": color(material.reflectance)} if "reflectance" in values else {}
     return _rough(plugin, material.roughness)
 
 

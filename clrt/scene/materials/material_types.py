@@ -37,7 +37,8 @@ class Diffuse(Material):
 class Conductor(Material):
     """Metal with a measured complex index of refraction eta + i·k per channel and a GGX microfacet distribution.
 
-    `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². Single scattering only.
+    `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². `reflectance`, which
+    measured metals do not have, multiplies what is reflected. Single scattering only.
     """
 
     kernel: ClassVar[str] = "conductor"
@@ -45,10 +46,15 @@ class Conductor(Material):
     eta: tuple[Index, Index, Index] | None = None
     k: tuple[Extinction, Extinction, Extinction] | None = None
     roughness: Unit | Texture = 0.3
+    reflectance: Albedo | Texture = (1.0, 1.0, 1.0)
 
     def parameters(self) -> dict[str, Parameter]:
         eta, k = CONDUCTORS[self.preset]
-        return {"eta": self.eta or eta, "k": self.k or k, "roughness": self.roughness}
+        values: dict[str, Parameter] = {"eta": self.eta or eta, "k": self.k or k, "roughness": self.roughness}
+        return values | ({"reflectance": self.reflectance} if self.features() else {})
+
+    def features(self) -> frozenset[str]:
+        return frozenset({"TINTED_CONDUCTOR"} if self.reflectance != (1.0, 1.0, 1.0) else ())
 
     def conflicts(self) -> list[str]:
         if (self.eta is None) == (self.k is None):

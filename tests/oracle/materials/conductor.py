@@ -18,9 +18,10 @@ class Metal(Mixed):
     def __init__(self, material: Conductor, at: Surface) -> None:
         eta, k = CONDUCTORS[material.preset]
         self._eta, self._k = np.array(material.eta or eta), np.array(material.k or k)
+        self._reflectance = at.color(material.reflectance)
         self._alpha = alpha_of(at.number(material.roughness))
         self.strategies = [VisibleNormals(self._alpha), Cosine()]
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
         fresnel = conductor(np.abs(dot(wo, halfway(wo, wi))), self._eta, self._k)
-        return fresnel * reflection(wo, wi, self._alpha)[:, None]
+        return self._reflectance * fresnel * reflection(wo, wi, self._alpha)[:, None]
