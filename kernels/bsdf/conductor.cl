@@ -5,12 +5,16 @@
 // at 82° (Hoffman 2019; Kutz et al. 2021) would fit these curves, but needs a fit for every metal.
 #include "bsdf/ggx.cl"
 #include "bsdf/interface.cl"
+#include BECKMANN_FILE
 
 struct conductor {
     real3 eta, k;
     real alpha;
 #if TINTED_CONDUCTOR
     real3 reflectance;
+#endif
+#if BECKMANN
+    ireal beckmann;     // whether the distribution is Beckmann's
 #endif
 };
 
@@ -20,6 +24,9 @@ static inline struct conductor conductor_at(const Scene *scene, ireal index, con
                               maximum(roughness * roughness, (real)(ALPHA_MIN))
 #if TINTED_CONDUCTOR
                               , PARAMETER3(conductor, reflectance)
+#endif
+#if BECKMANN
+                              , PARAMETER(conductor, beckmann) > 0.0f
 #endif
     };
 }
@@ -53,6 +60,9 @@ static inline BsdfValue conductor_eval(const struct conductor *m, real3 wo, real
     real3 f = conductor_fresnel(m, 0.5f * length);     // of wi·h = wo·h
     real visible = ggx_d(scale(sum, 1.0f / length), m->alpha) / (4.0f * wo.z * (1.0f + lambda_o));
     real seen = visible * (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i);
+#if BECKMANN
+    seen = m->beckmann ? beckmann_reflection(scale(sum, 1.0f / length), wo, wi, m->alpha) : seen;
+#endif
     return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), (BsdfValue){scale(f, seen), splat(ZERO), visible}, no_value());
 }
 

@@ -116,19 +116,24 @@ def conductor(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     outside = index(plugin, "ext_eta", "vacuum")
     indices = METALS.get(name, PERFECT) if name else (rgb(plugin.color("eta", 0.0)), rgb(plugin.color("k", 1.0)))
     eta, k = ((red / outside, green / outside, blue / outside) for red, green, blue in indices)
-    roughness = roughness_of(reader, plugin) if plugin.kind == "roughconductor" else 0.0
-    if roughness:
-        separable(reader, plugin, roughness)
-    else:
+    metal = Conductor(eta=eta, k=k, roughness=0.0, reflectance=color)
+    if plugin.kind == "conductor":
         reader.notes.differ(plugin, "smooth metal has alpha 0.0001, and reflects point-like lights")
-    return ShapeMaterial(Conductor(eta=eta, k=k, roughness=roughness, reflectance=color))
+        return ShapeMaterial(metal)
+    if plugin.value("distribution", str, "beckmann") == "beckmann":
+        metal = replace(metal, distribution="beckmann")
+    roughness = roughness_of(reader, plugin, ("ggx", "beckmann"))
+    separable(reader, plugin, roughness)
+    return ShapeMaterial(replace(metal, roughness=roughness))
 
 
-def roughness_of(reader: MaterialReader, plugin: Plugin) -> float | Texture:
-    """Return √alpha of an isotropic GGX distribution."""
+def roughness_of(
+    reader: MaterialReader, plugin: Plugin, distributions: tuple[str, ...] = ("ggx",)
+) -> float | Texture:
+    """Return √alpha of an isotropic distribution. distributions: those that the material has."""
     plugin.value("sample_visible", bool, True)
     distribution = plugin.value("distribution", str, "beckmann")
-    if distribution != "ggx":
+    if distribution not in distributions:
         reader.notes.instead(
             plugin,
             f'distribution "{distribution}" is not supported',
