@@ -106,14 +106,13 @@ def dielectric(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
 
 def conductor(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     name = plugin.value("material", str, "" if {"eta", "k"} & {*plugin.values} else "none")
-    color = reader.color(plugin, "specular_reflectance", 1.0)
+    color, outside = reader.color(plugin, "specular_reflectance", 1.0), index(plugin, "ext_eta", "vacuum")
     if name == "none" and plugin.kind == "conductor":
         return ShapeMaterial(Mirror(color=color))
     if name not in ("", "none", *METALS):
         plugin.refuse(
             f'material "{name}" is unknown', f"write eta and k, or one of {', '.join(METALS)}", f"metal {name}"
         )
-    outside = index(plugin, "ext_eta", "vacuum")
     indices = METALS.get(name, PERFECT) if name else (rgb(plugin.color("eta", 0.0)), rgb(plugin.color("k", 1.0)))
     eta, k = ((red / outside, green / outside, blue / outside) for red, green, blue in indices)
     metal = Conductor(eta=eta, k=k, roughness=0.0, reflectance=color)
@@ -127,9 +126,7 @@ def conductor(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     return ShapeMaterial(replace(metal, roughness=roughness))
 
 
-def roughness_of(
-    reader: MaterialReader, plugin: Plugin, distributions: tuple[str, ...] = ("ggx",)
-) -> float | Texture:
+def roughness_of(reader: MaterialReader, plugin: Plugin, distributions: tuple[str, ...] = ("ggx",)) -> float | Texture:
     """Return √alpha of an isotropic distribution. distributions: those that the material has."""
     plugin.value("sample_visible", bool, True)
     distribution = plugin.value("distribution", str, "beckmann")
@@ -141,12 +138,10 @@ def roughness_of(
             "GGX of the same alpha is used",
             f"{plugin.kind}, {distribution}",
         )
-    names = (
-        ("alpha_u", "alpha_v")
-        if {"alpha_u", "alpha_v"} & {*plugin.values, *dict(plugin.children)}
-        else ("alpha", "alpha")
-    )
-    alpha, other = (reader.number(plugin, name, 0.1) for name in names)
+    if {"alpha_u", "alpha_v"} & {*plugin.values, *dict(plugin.children)}:
+        alpha, other = (reader.number(plugin, name, 0.1) for name in ("alpha_u", "alpha_v"))
+    else:
+        alpha = other = reader.number(plugin, "alpha", 0.1)
     if alpha != other:
         reader.notes.instead(
             plugin,

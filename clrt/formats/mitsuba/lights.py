@@ -28,6 +28,7 @@ def light(plugin: Plugin, notes: Notes) -> Light | None:
         return _spot(plugin, notes)
     known = "point, spot, directional, constant, envmap, or area on a shape"
     what = f'emitter type "{plugin.kind}" is not supported'
+    plugin.ignore()
     notes.instead(plugin, what, f"use {known}", "it is left out")
     return None
 

@@ -70,6 +70,7 @@ class ShapeReader:
         if plugin.kind not in (*PRIMITIVES, *FILES):
             known = ", ".join((*PRIMITIVES, *FILES, "shapegroup", "instance"))
             what = f'shape type "{plugin.kind}" is not supported'
+            plugin.ignore()
             self._notes.instead(plugin, what, f"use {known}", "it is left out")
             return
         if _is_invisible(plugin):
@@ -103,7 +104,7 @@ class ShapeReader:
             if self._stand_in is None:
                 raise
             self.missing[plugin.where] = error.features
-            plugin.used |= {*plugin.values, *(name for name, _ in plugin.children)}
+            plugin.ignore()
             return ShapeMaterial(self._stand_in)
 
     def _own_look(self, plugin: Plugin) -> ShapeMaterial:
@@ -121,6 +122,7 @@ class ShapeReader:
         if name != "exterior" and (clear := absorbing(material, medium)):
             return clear
         what = f"is a {medium.kind} medium that scatters, or is not inside glass"
+        medium.ignore()
         self._notes.instead(medium, what, "leave it out", "it is left out", f"{medium.kind} medium")
         return material
 
@@ -130,6 +132,7 @@ class ShapeReader:
             emitter.used.add("sampling_weight")
             if emitter.kind != "area":
                 what = f'emitter type "{emitter.kind}" of a shape is not supported'
+                emitter.ignore()
                 self._notes.instead(emitter, what, "use area", "it is left out")
                 continue
             radiance = self._textures.color(emitter, "radiance", 1.0, emitted=True)
@@ -162,7 +165,7 @@ def _is_invisible(plugin: Plugin) -> bool:
     """Return whether light passes the shape, which only bounds a medium."""
     if [each.kind for each in plugin.all("bsdf")] != ["null"] or plugin.all("emitter") or plugin.all("medium"):
         return False
-    plugin.used |= {*plugin.values, *(name for name, _ in plugin.children)}
+    plugin.ignore()
     return True
 
 

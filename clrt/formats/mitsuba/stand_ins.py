@@ -22,6 +22,7 @@ def unknown(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
         f"use one of {', '.join(name for name in reader.types if name not in STAND_INS)}",
         "a diffuse surface is used",
     )
+    plugin.ignore()
     return ShapeMaterial(Diffuse(color=_color(reader, plugin)))
 
 
@@ -33,6 +34,7 @@ def nested(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     reader.notes.instead(
         plugin, f'bsdf type "{plugin.kind}" is not supported', "write the BSDF inside it", "the BSDF inside it is used"
     )
+    plugin.ignore()
     return reader.look(inner[0])
 
 
@@ -44,6 +46,7 @@ def principled(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
         "use roughplastic or roughconductor",
         "metallic_roughness is used, without anisotropy and transmission",
     )
+    plugin.ignore()
     # specular 0.5, the default, is an index of 1.5
     amount = min(max(plugin.value("specular", float, 0.5), 0.0), 1.0)
     ior = plugin.value("eta", float, 0.0) or 2 / (1 - sqrt(0.08 * amount)) - 1

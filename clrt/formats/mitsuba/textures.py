@@ -155,6 +155,14 @@ class TextureReader:
         return Texture(picture=Picture(texels, "checkerboard"), factor=factor, filter="nearest", **place)
 
 
+def mean_of(number: float | Texture) -> float:
+    """Return a number, or the mean of a texture that stands for one."""
+    if not isinstance(number, Texture):
+        return number
+    factor = number.factor if isinstance(number.factor, float) else 1.0
+    return float(number.picture.texels[..., 0].mean()) / 255 * factor
+
+
 def _pair(first: float, second: float, encoded: bool) -> tuple[int, int, float]:
     """Return the two texels, and the factor of at most 1, that approximate two values best."""
     levels = np.arange(256) / 255

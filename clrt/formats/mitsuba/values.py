@@ -20,6 +20,8 @@ Attributes = Mapping[str, str]
 
 #: Planck's constant in J·s, the speed of light in m/s, Boltzmann's constant in J/K; and an exponent with a finite exp.
 H, C, BOLTZMANN, LARGEST_EXPONENT = 6.62607015e-34, 299792458.0, 1.380649e-23, 700.0
+#: Number of characters of a value in a message.
+SHOWN = 60
 HEXADECIMAL = re.compile("#" + "([0-9a-fA-F]{2})" * 3)
 
 
@@ -210,4 +212,4 @@ def value_of(element: Element, where: str) -> Value:
             else (f"steps from {', '.join(STEPS)}" if element.tag == "transform" else "three numbers")
         )
         given = attributes.get("value", "of these steps" if element.tag == "transform" else "of these attributes")
-        raise SceneError(f'{where}: <{element.tag}> "{given}" cannot be read; write {wanted}') from None
+        raise SceneError(f'{where}: <{element.tag}> "{given:.{SHOWN}}" cannot be read; write {wanted}') from None

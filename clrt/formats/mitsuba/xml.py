@@ -116,6 +116,10 @@ class Plugin:
         self.used.add(name)
         return next((child for own, child in self.children if own == name), None)
 
+    def ignore(self) -> None:
+        """Count all parameters as read."""
+        self.used.update(self.values, (name for name, _ in self.children))
+
     def unread(self) -> list[str]:
         """Return the names of parameters that were not read."""
         return sorted(({*self.values} | {name for name, _ in self.children}) - self.used)

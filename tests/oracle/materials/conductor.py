@@ -9,8 +9,8 @@ from clrt.scene.materials.presets import CONDUCTORS
 
 from ..surface import Surface
 from ..vectors import Doubles, dot
-from .fresnel import conductor
 from .beckmann import reflection as beckmann_reflection
+from .fresnel import conductor
 from .ggx import VisibleNormals, alpha_of, reflection
 from .scattering import Cosine, Mixed, halfway
 
