@@ -96,20 +96,23 @@ MITSUBA = """<scene version="3.0.0">
 <film type="hdrfilm"><rfilter type="box"/><integer name="width" value="48"/><integer name="height" value="32"/></film>
 <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler></sensor>
 <bsdf type="twosided" id="board"><bsdf type="diffuse"><texture type="checkerboard" name="reflectance">
-<rgb name="color0" value="0.8, 0.3, 0.2"/><transform name="to_uv"><scale x="4" y="3"/><rotate z="1" angle="20"/></transform>
-</texture></bsdf></bsdf>
+<rgb name="color0" value="0.8, 0.3, 0.2"/><transform name="to_uv"><scale x="4" y="3"/><rotate z="1" angle="20"/>
+</transform></texture></bsdf></bsdf>
 <bsdf type="roughplastic" id="wood"><texture type="bitmap" name="diffuse_reflectance">
 <string name="filename" value="wood.png"/></texture><string name="distribution" value="ggx"/></bsdf>
 <alias id="wood" as="plank"/>
 <shape type="rectangle"><transform name="to_world"><scale value="4"/></transform><ref id="board"/></shape>
-<shape type="cylinder"><point name="p0" value="1.5, 0, 0.3"/><point name="p1" value="2.2, 0.4, 1.6"/><ref id="plank"/></shape>
+<shape type="cylinder"><point name="p0" value="1.5, 0, 0.3"/><point name="p1" value="2.2, 0.4, 1.6"/>
+<ref id="plank"/></shape>
 <shape type="shapegroup" id="group"><shape type="obj"><string name="filename" value="a.obj"/></shape></shape>
 <shape type="instance"><ref id="group"/><transform name="to_world"><rotate x="1" angle="70"/></transform></shape>
 <shape type="ply"><string name="filename" value="b.ply"/><bsdf type="roughconductor">
-<spectrum name="eta" value="400:0.2, 700:0.8"/><rgb name="k" value="3"/><float name="alpha" value="0.08"/></bsdf></shape>
+<spectrum name="eta" value="400:0.2, 700:0.8"/><rgb name="k" value="3"/><float name="alpha" value="0.08"/></bsdf>
+</shape>
 <shape type="sphere"><float name="radius" value="0.5"/><bsdf type="mask"><float name="opacity" value="0.3"/>
 <bsdf type="dielectric"><string name="int_ior" value="water"/></bsdf></bsdf>
-<medium type="homogeneous" name="interior"><rgb name="sigma_t" value="1, 2, 4"/><rgb name="albedo" value="0"/></medium></shape>
+<medium type="homogeneous" name="interior"><rgb name="sigma_t" value="1, 2, 4"/><rgb name="albedo" value="0"/></medium>
+</shape>
 <shape type="disk"><emitter type="area"><spectrum name="radiance" value="400:1, 500:3, 700:6"/></emitter></shape>
 <emitter type="spot"><rgb name="intensity" value="#ff8000"/><float name="cutoff_angle" value="30"/></emitter>
 <emitter type="envmap"><string name="filename" value="sky.hdr"/><float name="scale" value="2"/></emitter></scene>

@@ -28,7 +28,8 @@ def fresnel(cosine: float, ior: float) -> float:
 
 @pytest.mark.parametrize("ior", [1.1, 1.3, 1.5, 1.9])
 def test_smooth_coats(ior: float) -> None:
-    """r follows from reciprocity; the base reflects a share (1 − mean F)²/(ior²·(1 − r)) of white, here over what E leaves to it."""
+    """r follows from reciprocity; the base reflects (1 − mean F)²/(ior²·(1 − r)) of white light, over what E leaves
+    to it."""
     inside, scale = coat(ior, 0.0, "ggx")
     outside = quad(lambda cosine: 2 * cosine * fresnel(cosine, ior), 0, 1)[0]
     assert inside == pytest.approx(1 - (1 - outside) / ior**2, abs=1e-3)
@@ -91,5 +92,7 @@ def test_the_base_reflects_as_much_as_mitsubas(alpha: float, distribution: str, 
         theirs += outer * np.pi * float(np.dot(weights, values))
     inside, scale = coat(ior, alpha, distribution)
     first, grazing = albedos(cosines, alpha, "separable")
-    ours = base * scale / (1 - (base if nonlinear else 1) * inside) * (1 - weights @ (0.04 * (first - grazing) + grazing))
+    ours = (
+        base * scale / (1 - (base if nonlinear else 1) * inside) * (1 - weights @ (0.04 * (first - grazing) + grazing))
+    )
     assert ours == pytest.approx(theirs, rel=0.01)

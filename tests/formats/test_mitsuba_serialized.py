@@ -64,7 +64,9 @@ def test_arrays_are_read_as_written(seed: int, version: int, double: bool, names
         np.testing.assert_array_equal(found.faces, faces)
         for own, name in ((found.normals, "normals"), (found.uv, "uv")):
             assert (own is None) == (name not in names)
-            np.testing.assert_array_equal(own if own is not None else 0, arrays.get(name, np.zeros(1)).astype(np.float32))
+            np.testing.assert_array_equal(
+                own if own is not None else 0, arrays.get(name, np.zeros(1)).astype(np.float32)
+            )
 
 
 def test_a_scene_refers_to_a_mesh_by_its_number(folder: Path) -> None:

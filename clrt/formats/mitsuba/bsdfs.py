@@ -114,7 +114,9 @@ def conductor(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
             f'material "{name}" is unknown', f"write eta and k, or one of {', '.join(METALS)}", f"metal {name}"
         )
     indices = METALS.get(name, PERFECT) if name else (rgb(plugin.color("eta", 0.0)), rgb(plugin.color("k", 1.0)))
-    eta, k = ((red / outside, green / outside, blue / outside) for red, green, blue in indices)
+    eta, k = (
+        tuple(min(max(part / outside, least), 100.0) for part in parts) for parts, least in zip(indices, (0.01, 0.0))
+    )
     metal = Conductor(eta=eta, k=k, roughness=0.0, reflectance=color)
     if plugin.kind == "conductor":
         reader.notes.differ(plugin, "smooth metal has alpha 0.0001, and reflects point-like lights")

@@ -16,7 +16,7 @@ from .xml import Plugin
 #: Default of Mitsuba's camera, and the diagonal in mm of the film that focal_length refers to.
 FOCAL_LENGTH, DIAGONAL = "50mm", hypot(36, 24)
 #: Tolerance for a camera's axes to be orthogonal and equally long.
-ODD = 1e-5
+ODD = 1e-4
 #: Ignored parameters.
 CLIPPED = {"near_clip", "far_clip"}
 

@@ -30,6 +30,17 @@ def modernize(element: Element) -> None:
             if child.get("name") == "diffuse_reflectance":
                 child.attrib["name"] = "reflectance"
     _place_textures(element)
+    if element.tag == "emitter" and element.get("type") in ("sky", "sun", "sunsky"):
+        _erect(element)
+
+
+def _erect(sky: Element) -> None:
+    """Turn a sky whose zenith is +y by default to Mitsuba 3's, whose zenith is +z."""
+    transform = next((child for child in sky if child.tag == "transform"), None)
+    if transform is None:
+        transform = Element("transform", {"name": "to_world"}, sky.place)
+        sky.children.append(transform)
+    transform.children.insert(0, Element("rotate", {"x": "1", "angle": "-90"}, sky.place))
 
 
 def _place_textures(element: Element) -> None:

@@ -2,8 +2,8 @@
 
 Mitsuba's base is color·T(wi)·T(wo)/(π·ior²·(1 − r)), with the fraction T that the coat transmits and the reflectance r
 for diffuse light from inside; the coupling's is color·(1 − E(wi))·(1 − E(wo))/(π·(1 − mean E)), with the coat's albedo
-E. For a smooth coat they are equal: T = 1 − E, and ior²·(1 − r) = 1 − mean E by reciprocity. For a rough one Mitsuba's T
-and r lack what single scattering loses; the color here is scaled to give the base the same mean reflectance.
+E. For a smooth coat they are equal: T = 1 − E, and ior²·(1 − r) = 1 − mean E by reciprocity. For a rough one Mitsuba's
+T and r lack what single scattering loses; the color here is scaled to give the base the same mean reflectance.
 """
 
 from __future__ import annotations

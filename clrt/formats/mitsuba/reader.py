@@ -19,6 +19,7 @@ from .materials import MaterialReader
 from .notes import Notes
 from .shapes import ShapeReader
 from .stand_ins import unknown
+from .sun_and_sky import KINDS as SUN_AND_SKY, sun_and_sky
 from .textures import TextureReader
 from .xml import Plugin, UnsupportedError, read_xml
 
@@ -98,6 +99,10 @@ class _Reader:
         for plugin in root.all("emitter"):
             if plugin.kind in ENVIRONMENTS:
                 skies.append(self._tried(lambda each: environment(each, self._notes), plugin))
+            elif plugin.kind in SUN_AND_SKY:
+                sky, sun = self._tried(lambda each: sun_and_sky(each, self._notes), plugin) or (None, None)
+                skies += [sky] if sky else []
+                lights.append(sun)
             elif plugin.kind not in OF_SHAPES:
                 lights.append(self._tried(lambda each: light(each, self._notes), plugin))
         if len(skies) > 1:

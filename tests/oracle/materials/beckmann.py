@@ -1,5 +1,5 @@
-"""Beckmann microfacets: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces", eq. 25, and their
-rational approximation of Smith's masking, eq. 26."""
+"""Beckmann microfacets: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces", eq. 25, and the
+rational approximation there of Smith's masking, eq. 26."""
 
 from __future__ import annotations
 
