@@ -14,7 +14,7 @@ from ...errors import SceneError
 from ...scene.materials.material_types import Conductor, Dielectric, Diffuse, Material, Mirror
 from ...scene.materials.textures import Texture
 from .materials import WHITE, MaterialReader, ShapeMaterial
-from .refractive_indices import DIELECTRICS, METALS
+from .refractive_indices import DIELECTRICS, METALS, Triple
 from .textures import Attribute
 from .values import rgb
 from .xml import Plugin
@@ -114,9 +114,7 @@ def conductor(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
             f'material "{name}" is unknown', f"write eta and k, or one of {', '.join(METALS)}", f"metal {name}"
         )
     indices = METALS.get(name, PERFECT) if name else (rgb(plugin.color("eta", 0.0)), rgb(plugin.color("k", 1.0)))
-    eta, k = (
-        tuple(min(max(part / outside, least), 100.0) for part in parts) for parts, least in zip(indices, (0.01, 0.0))
-    )
+    eta, k = (_limited(parts, 1 / outside, least) for parts, least in zip(indices, (0.01, 0.0)))
     metal = Conductor(eta=eta, k=k, roughness=0.0, reflectance=color)
     if plugin.kind == "conductor":
         reader.notes.differ(plugin, "smooth metal has alpha 0.0001, and reflects point-like lights")
@@ -126,6 +124,12 @@ def conductor(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     roughness = roughness_of(reader, plugin, ("ggx", "beckmann"))
     separable(reader, plugin, roughness)
     return ShapeMaterial(replace(metal, roughness=roughness))
+
+
+def _limited(parts: Triple, factor: float, least: float) -> Triple:
+    """Return the numbers times a factor, within what a conductor may have; files have negative ones, too."""
+    red, green, blue = (min(max(part * factor, least), 100.0) for part in parts)
+    return red, green, blue
 
 
 def roughness_of(reader: MaterialReader, plugin: Plugin, distributions: tuple[str, ...] = ("ggx",)) -> float | Texture:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from ...errors import SceneError
+from ...scene.lights import Light
 from ...scene.materials.material import Material
 from ...scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from ...scene.render_settings import Filter, Integrator
@@ -95,18 +96,7 @@ class _Reader:
 
     def scene(self, root: Plugin, name: str) -> MitsubaScene:
         parts = [part for plugin in root.all("shape") for part in self._tried(self._parts, plugin) or []]
-        skies, lights = [], []
-        for plugin in root.all("emitter"):
-            if plugin.kind in ENVIRONMENTS:
-                skies.append(self._tried(lambda each: environment(each, self._notes), plugin))
-            elif plugin.kind in SUN_AND_SKY:
-                sky, sun = self._tried(lambda each: sun_and_sky(each, self._notes), plugin) or (None, None)
-                skies += [sky] if sky else []
-                lights.append(sun)
-            elif plugin.kind not in OF_SHAPES:
-                lights.append(self._tried(lambda each: light(each, self._notes), plugin))
-        if len(skies) > 1:
-            self._note(SceneError("scene: has several environment lights; keep one constant or envmap emitter"))
+        lights, sky = self._emitters(root.all("emitter"))
         settings, camera = RenderSettings(), Camera()
         for sensor in root.all("sensor")[:1]:
             settings = self._tried(lambda plugin: _film(plugin, self._notes), sensor) or settings
@@ -123,13 +113,33 @@ class _Reader:
             meshes=_of(parts, Mesh),
             spheres=_of(parts, Sphere),
             instances=_of(parts, Instance),
-            lights=[each for each in lights if each],
-            environment=next(filter(None, skies), Environment()),
+            lights=lights,
+            environment=sky or Environment(),
             camera=camera,
             render=settings,
             name=name,
         )
         return MitsubaScene(scene, self._notes.differences, self._shapes.missing)
+
+    def _emitters(self, emitters: list[Plugin]) -> tuple[list[Light], Environment | None]:
+        """Return the lights and the environment that a scene's own emitters are."""
+        around = [plugin for plugin in emitters if plugin.kind in (*ENVIRONMENTS, "sky", "sunsky")]
+        if len(around) > 1:
+            self._note(SceneError("scene: has several environment lights; keep one constant or envmap emitter"))
+        lights: list[Light | None] = []
+        sky: Environment | None = None
+        for plugin in emitters:
+            if plugin in around[1:] or plugin.kind in OF_SHAPES:
+                continue
+            if plugin.kind in ENVIRONMENTS:
+                sky = self._tried(lambda each: environment(each, self._notes), plugin)
+            elif plugin.kind in SUN_AND_SKY:
+                above, sun = self._tried(lambda each: sun_and_sky(each, self._notes), plugin) or (None, None)
+                sky = above or sky
+                lights.append(sun)
+            else:
+                lights.append(self._tried(lambda each: light(each, self._notes), plugin))
+        return [each for each in lights if each], sky
 
     def _parts(self, plugin: Plugin) -> list[Mesh | Sphere | Instance]:
         return list(self._shapes.parts(plugin))

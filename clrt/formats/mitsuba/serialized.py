@@ -10,6 +10,7 @@ import struct
 import zlib
 from io import BufferedReader
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,10 +82,9 @@ class _Stream:
         """Return the next numbers, in struct's notation."""
         return struct.unpack(f"<{form}", self.bytes(struct.calcsize(f"<{form}")))
 
-    def rows(self, count: int, width: int, dtype: str) -> NDArray[np.float32]:
+    def rows(self, count: int, width: int, dtype: str) -> NDArray[Any]:
         """Return the next array (count, width)."""
-        values = np.frombuffer(self.bytes(count * width * np.dtype(dtype).itemsize), dtype).reshape(count, width)
-        return np.ascontiguousarray(values, np.float32 if dtype[1] == "f" else np.int64)
+        return np.frombuffer(self.bytes(count * width * np.dtype(dtype).itemsize), dtype).reshape(count, width)
 
 
 def _mesh(stream: _Stream, name: str) -> tuple[Mesh, bool]:
@@ -98,13 +98,13 @@ def _mesh(stream: _Stream, name: str) -> tuple[Mesh, bool]:
     widths = 3 + 3 * bool(flags & NORMALS) + 2 * bool(flags & UV) + 3 * bool(flags & COLORS)
     if vertices * widths * np.dtype(real).itemsize + triangles * 12 > stream.most:
         raise SceneError(f"has {vertices} vertices and {triangles} triangles, too many for its size; export it again")
-    points = stream.rows(vertices, 3, real)
-    normals = stream.rows(vertices, 3, real) if flags & NORMALS else None
-    uv = stream.rows(vertices, 2, real) if flags & UV else None
+    points = stream.rows(vertices, 3, real).astype(np.float32)
+    normals = stream.rows(vertices, 3, real).astype(np.float32) if flags & NORMALS else None
+    uv = stream.rows(vertices, 2, real).astype(np.float32) if flags & UV else None
     if flags & COLORS:
         stream.rows(vertices, 3, real)
-    faces = stream.rows(triangles, 3, "<u4")
+    faces = stream.rows(triangles, 3, "<u4").astype(np.int64)
     if faces.size and faces.max() >= vertices:
         raise SceneError(f"has a face with vertex {faces.max()} of {vertices}; export it again")
-    mesh = Mesh(points, faces, name=name, normals=None if flags & FLAT else normals, uv=uv)
+    mesh = Mesh(points, faces.astype(np.int32), name=name, normals=None if flags & FLAT else normals, uv=uv)
     return mesh, bool(flags & FLAT)

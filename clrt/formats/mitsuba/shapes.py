@@ -38,6 +38,8 @@ PRIMITIVES: dict[str, Callable[[], Mesh]] = {
 FILES = ("obj", "ply", "serialized")
 #: Tolerance for a transform to be a rotation, translation and uniform scale.
 UNEVEN = 1e-5
+#: Maximum number of spheres and disks that become triangles, of 2 MB each.
+MOST_ROUND = 256
 Part = Mesh | Sphere
 Attributes = Mapping[str, FloatArray]
 
@@ -56,6 +58,7 @@ class ShapeReader:
         self._materials = materials
         self._notes = notes
         self._stand_in = stand_in
+        self._round = 0
         self.missing: dict[str, list[str]] = {}
         self._groups: dict[Plugin, list[Part]] = {}
 
@@ -89,6 +92,9 @@ class ShapeReader:
         elif plugin.kind == "cylinder":
             to_world = to_world @ _between(plugin)
         if plugin.kind in PRIMITIVES:
+            self._round += plugin.kind in ("sphere", "disk")
+            if self._round > MOST_ROUND:
+                raise SceneError(f"scene: more than {MOST_ROUND} spheres and disks are tessellated; write .ply files")
             pieces: list[tuple[Mesh, Attributes]] = [(PRIMITIVES[plugin.kind](), {})]
         else:
             pieces = list(_from_file(plugin, mirrored))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...scene.geometry.transform import unit
 from ...scene.lights import DirectionalLight
-from ...scene.model import Environment
+from ...scene.model import Environment, FloatArray
 from ...scene.spectra import RGB_FROM_XYZ
 from .notes import Notes
 from .values import Doubles
@@ -109,7 +109,7 @@ def _direction(plugin: Plugin, turn: Doubles) -> Doubles:
     return np.asarray(turn @ unit(np.array([east, north, up])))
 
 
-def sky_image(towards: Doubles, zenith: Doubles, turbidity: float) -> Doubles:
+def sky_image(towards: Doubles, zenith: Doubles, turbidity: float) -> FloatArray:
     """Return an environment map (h, w, 3), black below the horizon. towards: unit, to the sun."""
     theta, phi = np.pi * (np.arange(ROWS) + 0.5) / ROWS, np.pi * (np.arange(2 * ROWS) + 0.5) / ROWS
     across = np.sin(theta)[:, None]

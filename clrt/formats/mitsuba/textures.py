@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ...errors import SceneError
 from ...scene.materials.textures import Picture, Texture, Wrap
 from ..images.image_reader import linear_from_srgb, read_texels, srgb_from_linear
 from .notes import Notes
@@ -24,6 +25,8 @@ FILTERS: dict[str, Literal["linear", "nearest"]] = {
     "trilinear": "linear",
     "ewa": "linear",
 }
+#: Maximum number of bytes of converted textures.
+MOST_BAKED = 2**31
 #: Gamma of Mitsuba 0.x that is taken for sRGB, as is −1.
 SRGB = 2.2
 #: Conversion of texels from or to sRGB.
@@ -47,6 +50,7 @@ class TextureReader:
 
     def __init__(self, notes: Notes) -> None:
         self._notes = notes
+        self._baked = 0
         self._pictures: dict[tuple[str, Curve, bool], Picture] = {}
 
     def color(self, owner: Plugin, name: str, default: float, *, emitted: bool = False) -> Any:
@@ -114,11 +118,11 @@ class TextureReader:
         if (file, curve, grey) not in self._pictures:
             path = Path(file)
             texels = read_texels(path)
-            values = texels[..., :3] / np.float32(255)
+            values = np.asarray(texels[..., :3] / 255, np.float32)
             if curve:
                 values = linear_from_srgb(values) if curve == "decode" else srgb_from_linear(values)
             if grey:
-                values = np.repeat((values @ LUMINANCE)[..., None], 3, axis=2)
+                values = np.repeat((values @ LUMINANCE.astype(np.float32))[..., None], 3, axis=2)
             if curve or grey:
                 texels = np.concatenate([np.round(values * 255).astype(np.uint8), texels[..., 3:]], axis=2)
             self._pictures[file, curve, grey] = Picture(texels, path.stem)
@@ -133,6 +137,9 @@ class TextureReader:
         factors = np.broadcast_to(texture.factor, 3)
         table = function(np.clip(levels[:, None] * factors, 0, 1).astype(np.float64)).astype(np.float32)
         table = np.round((srgb_from_linear(table) if use == "color" else table) * 255).astype(np.uint8)
+        self._baked += texture.picture.texels.nbytes
+        if self._baked > MOST_BAKED:
+            raise SceneError(f"scene: more than {MOST_BAKED >> 30} GiB of textures are converted; use smaller images")
         texels = texture.picture.texels.copy()
         for channel in range(3):
             texels[..., channel] = table[texels[..., channel], channel]

@@ -94,10 +94,9 @@ def encoded_color(text: str) -> Color:
 def spectrum(text: str) -> Spectrum | Color:
     """Parse a constant, pairs of a wavelength and a value, or, as in Mitsuba 0.x, three numbers for a linear color."""
     if ":" not in text:
-        values = numbers(text)
-        if len(values) == 3:
+        if len(numbers(text)) == 3:
             return color(text)
-        (value,) = values
+        (value,) = numbers(text)
         return Spectrum((), (value,))
     pairs = [numbers(pair.replace(":", " ")) for pair in text.replace(",", " ").split()]
     wavelengths, values = (tuple(row) for row in zip(*pairs, strict=True))

@@ -37,8 +37,8 @@ PLUGINS = (
     "phase",
     "volume",
 )
-#: Maximum nesting depth of includes.
-INCLUDES = 15
+#: Maximum nesting depth of includes, and their number.
+INCLUDES, MOST_INCLUDES = 15, 1000
 #: Maximum number of characters that all uses of defaults may be replaced by.
 LONGEST = 10_000_000
 
@@ -145,6 +145,7 @@ class _Document:
         self._folders = [path.parent]
         self._defaults: dict[str, str] = {}
         self._substituted = 0
+        self._included = 0
         self._by_id: dict[str, Plugin] = {}
         self._references: list[tuple[Plugin, int, str]] = []
         self._counts: dict[str, int] = {}
@@ -228,6 +229,9 @@ class _Document:
         filename = element.get("filename")
         if depth > INCLUDES:
             raise SceneError(f"{filename}: is included more than {INCLUDES} files deep; include it once")
+        self._included += 1
+        if self._included > MOST_INCLUDES:
+            raise SceneError(f"{element.place}: more than {MOST_INCLUDES} files are included; include fewer")
         self._read_children(self._root(self.file(filename)), owner, depth)
 
     def _known(self, element: Element) -> Plugin:
