@@ -38,6 +38,7 @@ def load(
     time: float | None = None,
     light_unit: LightUnit | None = None,
     ignore_extensions: Iterable[str] = (),
+    approximate: bool = False,
 ) -> Scene:
     """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (.glb .gltf .obj .ply .stl .off).
 
@@ -51,6 +52,9 @@ def load(
     lux, "radiometric" for W/sr and W/m², "blender" for watts; by default as the file's generator and their brightness
     suggest. ignore_extensions: names of extensions that the file may require although clrt does not support them.
 
+    approximate: of a Mitsuba scene, what clrt lacks is replaced by something similar or left out, with a warning each,
+    instead of an error.
+
     Raises SceneError, which lists all problems.
     """
     given = (ignore_extensions,) if isinstance(ignore_extensions, str) else tuple(ignore_extensions)
@@ -62,7 +66,7 @@ def load(
         light_unit=light_unit,
         ignore_extensions=given or None,
     )
-    return _load(path, camera, up, unit, choice)
+    return _load(path, camera, up, unit, choice, approximate=approximate)
 
 
 @listed(RendererOptions, SETTINGS)

@@ -33,7 +33,7 @@ SECONDS = 30
 #: Files larger than this number of bytes are not used as seeds.
 LARGEST = 300_000
 PICTURES = (".hdr", ".exr", ".png", ".jpg")
-FORMATS = (".toml", ".glb", ".gltf", ".obj", ".mtl", ".ply", ".stl", ".off", *PICTURES)
+FORMATS = (".toml", ".glb", ".gltf", ".obj", ".mtl", ".ply", ".stl", ".off", ".xml", ".serialized", *PICTURES)
 GOOD = ("picture", "error")
 NUMBERS = [
     "-1",
@@ -223,7 +223,7 @@ def outcome(file: Path, render: bool) -> str:
             if file.suffix in (".png", ".jpg"):
                 read_texels(file.read_bytes(), file.name)
             return "picture"
-        scene = load(file.with_suffix(".obj") if file.suffix == ".mtl" else file)
+        scene = load(file.with_suffix(REFERRING[file.suffix][0]) if file.suffix in REFERRING else file)
         if render:
             from clrt.rendering.renderer import Renderer
 
@@ -254,8 +254,9 @@ def work(folder: Path, first: int, last: int, render: int) -> None:
         seed, content = case(seeds, number)
         file = folder / "seeds" / f"damaged{seed.suffix}"
         file.write_bytes(content)
-        if seed.suffix == ".mtl":
-            file.with_suffix(".obj").write_text(OBJ)
+        if seed.suffix in REFERRING:
+            suffix, text = REFERRING[seed.suffix]
+            file.with_suffix(suffix).write_text(text)
         print(number, end=" ", flush=True)
         signal.alarm(SECONDS)
         told = outcome(file, bool(render) and loaded % render == 0)
@@ -310,6 +311,10 @@ def run(
 
 
 OBJ = "mtllib damaged.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 3 2 1\n"
+XML = """<scene version="3.0.0"><shape type="serialized"><string name="filename" value="damaged.serialized"/>
+<integer name="shape_index" value="1"/></shape></scene>"""
+#: For files that only others refer to, the suffix and text of one that does.
+REFERRING = {".mtl": (".obj", OBJ), ".serialized": (".xml", XML)}
 
 
 def main() -> None:

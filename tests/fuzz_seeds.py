@@ -25,6 +25,7 @@ from .formats.test_meshes import (
     stl_binary,
 )
 from .formats.test_meshopt import compress
+from .formats.test_mitsuba_serialized import TRIANGLE, serialized, stream
 from .formats.test_ply import XYZ, Element, written
 from .formats.test_stl import binary
 from .fuzz import FORMATS, LARGEST, OBJ
@@ -88,6 +89,45 @@ map_Kd -s 2 2 2 wood.png
 """
 
 
+MITSUBA = """<scene version="3.0.0">
+<default name="spp" value="16"/>
+<integrator type="path"><integer name="max_depth" value="4"/></integrator>
+<sensor type="thinlens"><float name="fov" value="50"/><float name="aperture_radius" value="0.1"/>
+<transform name="to_world"><lookat origin="1, -7, 3" target="0, 0, 1" up="0, 0, 1"/></transform>
+<film type="hdrfilm"><rfilter type="box"/><integer name="width" value="48"/><integer name="height" value="32"/></film>
+<sampler type="independent"><integer name="sample_count" value="$spp"/></sampler></sensor>
+<bsdf type="twosided" id="board"><bsdf type="diffuse"><texture type="checkerboard" name="reflectance">
+<rgb name="color0" value="0.8, 0.3, 0.2"/><transform name="to_uv"><scale x="4" y="3"/><rotate z="1" angle="20"/>
+</transform></texture></bsdf></bsdf>
+<bsdf type="roughplastic" id="wood"><texture type="bitmap" name="diffuse_reflectance">
+<string name="filename" value="wood.png"/></texture><string name="distribution" value="ggx"/></bsdf>
+<alias id="wood" as="plank"/>
+<shape type="rectangle"><transform name="to_world"><scale value="4"/></transform><ref id="board"/></shape>
+<shape type="cylinder"><point name="p0" value="1.5, 0, 0.3"/><point name="p1" value="2.2, 0.4, 1.6"/>
+<ref id="plank"/></shape>
+<shape type="shapegroup" id="group"><shape type="obj"><string name="filename" value="a.obj"/></shape></shape>
+<shape type="instance"><ref id="group"/><transform name="to_world"><rotate x="1" angle="70"/></transform></shape>
+<shape type="ply"><string name="filename" value="b.ply"/><bsdf type="roughconductor">
+<spectrum name="eta" value="400:0.2, 700:0.8"/><rgb name="k" value="3"/><float name="alpha" value="0.08"/></bsdf>
+</shape>
+<shape type="sphere"><float name="radius" value="0.5"/><bsdf type="mask"><float name="opacity" value="0.3"/>
+<bsdf type="dielectric"><string name="int_ior" value="water"/></bsdf></bsdf>
+<medium type="homogeneous" name="interior"><rgb name="sigma_t" value="1, 2, 4"/><rgb name="albedo" value="0"/></medium>
+</shape>
+<shape type="disk"><emitter type="area"><spectrum name="radiance" value="400:1, 500:3, 700:6"/></emitter></shape>
+<emitter type="spot"><rgb name="intensity" value="#ff8000"/><float name="cutoff_angle" value="30"/></emitter>
+<emitter type="envmap"><string name="filename" value="sky.hdr"/><float name="scale" value="2"/></emitter></scene>
+"""
+MITSUBA_0 = """<scene version="0.6.0">
+<integrator type="bdpt"><integer name="maxDepth" value="-1"/></integrator>
+<shape type="serialized"><string name="filename" value="a.serialized"/><integer name="shapeIndex" value="1"/>
+<transform name="toWorld"><matrix value="1 0 0 0 0 1 0 2 0 0 1 0 0 0 0 1"/></transform>
+<bsdf type="phong"><srgb name="diffuseReflectance" value="#808080"/><float name="exponent" value="20"/></bsdf></shape>
+<emitter type="point"><blackbody name="intensity" temperature="5000K" scale="1e-3"/>
+<transform name="toWorld"><translate x="1" y="2"/></transform></emitter></scene>
+"""
+
+
 def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
     """Write a few seeds of each format to `folder`, and the small files found in the folders `more`."""
     folder.mkdir(parents=True)
@@ -124,6 +164,10 @@ def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
     (folder / "a.mtl").write_text(MTL)
     (folder / "b.obj").write_text(OBJ.replace("damaged", "a"))
     (folder / "a.toml").write_text(SCENE)
+    for name, text in {"a.xml": MITSUBA, "old.xml": MITSUBA_0}.items():
+        (folder / name).write_text(text)
+    parts = [stream(TRIANGLE, np.array([[0, 1, 2]]), 4)] * 2
+    (folder / "a.serialized").write_bytes(serialized(parts))
     pixels = np.random.default_rng(0).random((24, 48, 3), np.float32)
     pixels[:, 20:40] = 0.5
     for name in ("sky.hdr", "sky.exr"):

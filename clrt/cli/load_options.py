@@ -62,6 +62,13 @@ class LoadOptions:
         help="Read a bare glTF file without this extension, which it requires but clrt does not support.",
     )
 
+    approximate: bool = flag(
+        "--approximate",
+        default=False,
+        is_flag=True,
+        help="Replace what clrt lacks of a Mitsuba scene by something similar, or leave it out, with a warning each.",
+    )
+
     def load(self, path: Path, moving: bool = False) -> Scene:
         """Load the scene or model. moving: whether its animation is rendered. Raises SceneError."""
         from ..formats.load_scene import load
@@ -75,4 +82,4 @@ class LoadOptions:
             light_unit=self.light_unit,
             ignore_extensions=self.ignore_extensions or None,
         )
-        return load(path, self.camera, self.up, self.unit, choice, moving)
+        return load(path, self.camera, self.up, self.unit, choice, moving, self.approximate)

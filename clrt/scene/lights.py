@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from math import pi, radians, sin, sqrt
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 
@@ -140,7 +140,8 @@ class PointLight(BaseLight):
 class SpotLight(BaseLight):
     """Spot light of `intensity` W/sr in a cone around `direction`.
 
-    It falls from `inner_degrees` to zero at `outer_degrees` as in glTF's KHR_lights_punctual. `range`: as PointLight's.
+    It falls from `inner_degrees` to zero at `outer_degrees`. falloff: "cosine" as in glTF's KHR_lights_punctual, or
+    linearly in the "angle" as in Mitsuba. `range`: as PointLight's.
     """
 
     kernel: ClassVar[str] = "spot"
@@ -149,10 +150,20 @@ class SpotLight(BaseLight):
     intensity: Radiance
     inner_degrees: Annotated[float, Ge(0), Lt(90)] = 0.0
     outer_degrees: Annotated[float, Gt(0), Le(90)] = 45.0
+    falloff: Literal["cosine", "angle"] = "cosine"
     range: Length | None = None
 
+    @classmethod
+    def kernels(cls) -> tuple[str, ...]:
+        return "spot", "beam"
+
+    @property
+    def sampled_by(self) -> str:
+        return "beam" if self.falloff == "angle" else "spot"
+
     def parameters(self) -> dict[str, float | Vector]:
-        inner, outer = one_minus_cos(self.inner_degrees), one_minus_cos(self.outer_degrees)
+        scale = radians if self.falloff == "angle" else one_minus_cos
+        inner, outer = scale(self.inner_degrees), scale(self.outer_degrees)
         return {
             "position": self.position,
             "axis": unit_vector(self.direction),

@@ -5,16 +5,30 @@
 // at 82° (Hoffman 2019; Kutz et al. 2021) would fit these curves, but needs a fit for every metal.
 #include "bsdf/ggx.cl"
 #include "bsdf/interface.cl"
+#include BECKMANN_FILE
 
 struct conductor {
     real3 eta, k;
     real alpha;
+#if TINTED_CONDUCTOR
+    real3 reflectance;
+#endif
+#if BECKMANN
+    ireal beckmann;     // whether the distribution is Beckmann's
+#endif
 };
 
 static inline struct conductor conductor_at(const Scene *scene, ireal index, const Surface *surface) {
     real roughness = PARAMETER(conductor, roughness);
     return (struct conductor){PARAMETER3(conductor, eta), PARAMETER3(conductor, k),
-                              maximum(roughness * roughness, (real)(ALPHA_MIN))};
+                              maximum(roughness * roughness, (real)(ALPHA_MIN))
+#if TINTED_CONDUCTOR
+                              , PARAMETER3(conductor, reflectance)
+#endif
+#if BECKMANN
+                              , PARAMETER(conductor, beckmann) > 0.0f
+#endif
+    };
 }
 
 // F for unpolarised light from vacuum (Born and Wolf, 14.2), with a² + b² = |n² − sin²| for n = eta + i·k. The smaller
@@ -31,8 +45,13 @@ static inline real fresnel_conductor(real cos_o, real eta, real k) {
 }
 
 static inline real3 conductor_fresnel(const struct conductor *m, real cos_o) {
-    return vector(fresnel_conductor(cos_o, m->eta.x, m->k.x), fresnel_conductor(cos_o, m->eta.y, m->k.y),
-                  fresnel_conductor(cos_o, m->eta.z, m->k.z));
+#if TINTED_CONDUCTOR
+#define TINTED(f) mul(m->reflectance, f)
+#else
+#define TINTED(f) f
+#endif
+    return TINTED(vector(fresnel_conductor(cos_o, m->eta.x, m->k.x), fresnel_conductor(cos_o, m->eta.y, m->k.y),
+                         fresnel_conductor(cos_o, m->eta.z, m->k.z)));
 }
 
 static inline BsdfValue conductor_eval(const struct conductor *m, real3 wo, real3 wi) {
@@ -41,6 +60,9 @@ static inline BsdfValue conductor_eval(const struct conductor *m, real3 wo, real
     real3 f = conductor_fresnel(m, 0.5f * length);     // of wi·h = wo·h
     real visible = ggx_d(scale(sum, 1.0f / length), m->alpha) / (4.0f * wo.z * (1.0f + lambda_o));
     real seen = visible * (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i);
+#if BECKMANN
+    seen = m->beckmann ? beckmann_reflection(scale(sum, 1.0f / length), wo, wi, m->alpha) : seen;
+#endif
     return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), (BsdfValue){scale(f, seen), splat(ZERO), visible}, no_value());
 }
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from clrt.errors import SceneError
 from clrt.formats.images.image_reader import linear_from_srgb
 from clrt.formats.load_scene import load
-from clrt.formats.mitsuba.lights import rows_at_middles
+from clrt.formats.mitsuba.environment_map import rows_at_middles
 from clrt.formats.mitsuba.primitives import cube, cylinder, disk, rectangle, sphere
 from clrt.formats.mitsuba.reader import MitsubaScene, read_mitsuba
 from clrt.formats.mitsuba.textures import _pair
@@ -106,10 +106,10 @@ def test_defaults_includes_references_and_paths(folder: Path) -> None:
         ('<shape type="sphere"><ref id="none"/></shape>', ["shape[0]", '"none"', "define it"]),
         ('<shape type="sphere"><float name="radius" value="wide"/></shape>', ["shape[0].radius", '"wide"', "a number"]),
         ('<shape type="sphere"><float name="girth" value="2"/></shape>', ["shape[0]", '"girth"', "leave it out"]),
-        ('<shape type="sphere"><float name="radius" value="$r"/></shape>', ["shape[0]", "$r", "<default"]),
+        ('<shape type="sphere"><float name="radius" value="$r"/></shape>', ["line 1", "$r", "<default"]),
         ('<shape type="sphere"><frame name="x"/></shape>', ["shape[0]", "<frame>", "transform"]),
         ('<shape type="obj"><string name="filename" value="gone.obj"/></shape>', ["gone.obj", "no such model file"]),
-        ('<emitter type="spot"/>', ["emitter[0]", '"spot"', "point"]),
+        ('<emitter type="ies"/>', ["line 1: emitter[0]", '"ies"', "point", "--approximate"]),
         ('<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>', ["hide_emitters"]),
         (
             '<sensor type="perspective"><transform name="to_world"><scale x="-1"/></transform></sensor>',
@@ -142,10 +142,10 @@ def test_mistakes_are_named(folder: Path, text: str, words: list[str]) -> None:
 
 def test_all_that_is_unsupported_is_listed(folder: Path) -> None:
     (folder / "scene.xml").write_text("""<scene version="3.0.0"><shape type="torus"/><emitter type="projector"/>
-        <shape type="sphere"><bsdf type="hair"/></shape><integrator type="bdpt"/></scene>""")
+        <shape type="sphere"><bsdf type="hair"/></shape><integrator type="depth"/></scene>""")
     with pytest.raises(UnsupportedError) as error:
         read_mitsuba(folder / "scene.xml")
-    assert error.value.features == ["shape torus", "bsdf hair", "emitter projector", "integrator bdpt"]
+    assert error.value.features == ["shape torus", "bsdf hair", "emitter projector", "integrator depth"]
     read = read_mitsuba_of(folder, '<shape type="sphere"><bsdf type="hair"/></shape><shape type="sphere"/>')
     assert read.missing == {"shape[0]": ["bsdf hair"]} and len(read.scene.spheres) == 2
 

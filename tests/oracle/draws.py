@@ -113,7 +113,9 @@ def _dielectric(draws: Draws) -> dict[str, Any]:
 
 def _conductor(draws: Draws) -> dict[str, Any]:
     given: dict[str, Any] = {"roughness": draws.number(SMOOTHEST), "preset": draws.one_of(CONDUCTORS)}
-    return given | ({"eta": draws.vector(0.2, 3.0), "k": draws.vector(0.0, 5.0)} if draws.chance(0.3) else {})
+    given |= {"eta": draws.vector(0.2, 3.0), "k": draws.vector(0.0, 5.0)} if draws.chance(0.3) else {}
+    given |= {"distribution": "beckmann"} if draws.chance(0.3) else {}
+    return given | ({"reflectance": draws.color()} if draws.chance(0.3) else {})
 
 
 def _metallic_roughness(draws: Draws) -> dict[str, Any]:

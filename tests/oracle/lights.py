@@ -50,12 +50,15 @@ def arriving(light: Known, p: Doubles) -> tuple[Doubles, Doubles, Doubles]:
 
 
 def _falloff(light: PointLight | SpotLight, towards: Doubles) -> Doubles:
-    """Return KHR_lights_punctual's falloff: the square of a ramp linear in the cosine from the inner to the outer
-    cone."""
+    """Return KHR_lights_punctual's falloff, the square of a ramp linear in the cosine from the inner to the outer cone;
+    or one linear in the angle."""
     if isinstance(light, PointLight):
         return np.ones(len(towards))
     inner, outer = np.cos(np.radians([light.inner_degrees, light.outer_degrees]))
     cosine = -dot(towards, unit(np.array(light.direction, float)))
+    if light.falloff == "angle":
+        ramp = light.outer_degrees - np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+        return np.asarray(np.clip(ramp / (light.outer_degrees - light.inner_degrees), 0, 1))
     return np.asarray(np.clip((cosine - outer) / (inner - outer), 0, 1) ** 2)
 
 

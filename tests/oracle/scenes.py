@@ -121,6 +121,7 @@ class _Stage:
                     range=reach,
                     inner_degrees=draws.between(0.0, 0.9) * outer,
                     outer_degrees=outer,
+                    falloff=draws.one_of(("cosine", "angle")),
                 )
             )
 

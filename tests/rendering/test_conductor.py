@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.special import erf
 
 from clrt.bench.kernel_probe import Doubles
 from clrt.bench.numerics.bsdf_cases import bsdfs
@@ -42,6 +45,26 @@ def test_it_is_fresnels_with_a_complex_index(device: Device, eta: tuple[float, .
     off = np.abs(metal.value(0, wo, wi)[0] - expected)
     roundings = 1e-5 / np.linalg.norm(wo + wi, axis=1, keepdims=True)
     assert np.all(off <= roundings * expected + 1e-6 * (d / wo[:, 2])[:, None])
+
+
+@pytest.mark.parametrize("roughness", [0.1, 0.3, 0.6, 1.0])
+def test_beckmann_is_as_published(device: Device, roughness: float) -> None:
+    """D by its definition, and the exact Smith masking with the error function, which the rational one approximates."""
+    alpha = roughness**2
+    plain = Conductor(eta=(0.01,) * 3, k=(100.0,) * 3, roughness=roughness)
+    tinted = replace(plain, distribution="beckmann", reflectance=(1.0, 0.5, 0.25))
+    metal = bsdfs(device, [plain, replace(plain, distribution="beckmann"), tinted])
+    wo, wi = above(5000, 5), above(5000, 6)
+    h = (wo + wi) / np.linalg.norm(wo + wi, axis=1, keepdims=True)
+    tan2 = (1 - h[:, 2] ** 2) / h[:, 2] ** 2
+    d = np.exp(-tan2 / alpha**2) / (np.pi * alpha**2 * h[:, 2] ** 4)
+    a = [w[:, 2] / (alpha * np.sqrt(1 - w[:, 2] ** 2)) for w in (wo, wi)]
+    lambda_o, lambda_i = ((erf(each) - 1) / 2 + np.exp(-(each**2)) / (2 * np.sqrt(np.pi) * each) for each in a)
+    expected = d / (1 + lambda_o + lambda_i) / (4 * wo[:, 2])
+    found = metal.value(1, wo, wi)[0]
+    np.testing.assert_allclose(found[:, 0], expected, rtol=0.01, atol=2e-4 * d.max())
+    np.testing.assert_allclose(metal.value(2, wo, wi)[0], found * (1, 0.5, 0.25), rtol=1e-6, atol=1e-30)
+    assert np.abs(metal.value(0, wo, wi)[0] - found).max() > 0.1 * found.max()
 
 
 @pytest.mark.parametrize("name", sorted(set(CONDUCTORS) & set(F0_PRESETS)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -27,9 +28,13 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def fade(light: SpotLight, points: Doubles) -> Doubles:
-    """Return clamp((cos θ − cos outer)/(cos inner − cos outer))², (n,), of KHR_lights_punctual's sample code."""
+    """Return clamp((cos θ − cos outer)/(cos inner − cos outer))², (n,), of KHR_lights_punctual's sample code; for the
+    other falloff clamp((outer − θ)/(outer − inner))."""
     away = points - light.position
     cosine = away @ np.array(light.direction) / np.linalg.norm(away, axis=-1) / np.linalg.norm(light.direction)
+    if light.falloff == "angle":
+        ramp = light.outer_degrees - np.degrees(np.arccos(cosine.clip(-1, 1)))
+        return np.asarray(np.clip(ramp / (light.outer_degrees - light.inner_degrees), 0, 1))
     inner, outer = np.cos(np.radians([light.inner_degrees, light.outer_degrees]))
     return np.asarray(np.clip((cosine - outer) / (inner - outer), 0, 1) ** 2)
 
@@ -59,7 +64,8 @@ def spots(count: int, seed: int = 0) -> list[SpotLight]:
 
 
 @pytest.mark.parametrize(("inner", "outer"), [(0.0, 45.0), (20.0, 30.0), (29.9999, 30.0), (0.0, 90.0), (0.0, 1e-3)])
-def test_irradiance(device: Device, inner: float, outer: float) -> None:
+@pytest.mark.parametrize("falloff", ["cosine", "angle"])
+def test_irradiance(device: Device, inner: float, outer: float, falloff: Literal["cosine", "angle"]) -> None:
     """On the axis, off it by fractions of the outer angle, and outside; near and far. A narrow cone is axis-aligned,
     so that float32 represents the points' angles."""
     light = SpotLight(
@@ -68,6 +74,7 @@ def test_irradiance(device: Device, inner: float, outer: float) -> None:
         intensity=(60.0, 5.0, 1.0),
         inner_degrees=inner,
         outer_degrees=outer,
+        falloff=falloff,
     )
     axis, aside = np.array(light.direction) / np.linalg.norm(light.direction), np.array([0.0, 0.0, 1.0])
     parts = np.radians(outer) * np.array([0.0, 0.3, 0.6, 0.9, 0.99, 1.01])

@@ -273,6 +273,12 @@ def _dielectric(material: Dielectric) -> Plugin:
 def _conductor(material: Conductor) -> Plugin:
     values = material.parameters()
     plugin = {"type": "roughconductor", "eta": rgb(values["eta"]), "k": rgb(values["k"])}
+    plugin |= {"specular_reflectance": color(material.reflectance)} if "reflectance" in values else {}
+    if material.distribution == "beckmann":
+        alpha = _alpha(material.roughness)
+        if alpha > NEARLY_SMOOTH:
+            raise ValueError(f"Beckmann's distribution with alpha above {NEARLY_SMOOTH} and height-correlated masking")
+        return plugin | {"distribution": "beckmann", "alpha": alpha}
     return _rough(plugin, material.roughness)
 
 

@@ -188,18 +188,18 @@ def _up_for(direction: Any) -> tuple[float, float, float]:
 
 
 def _spot(light: SpotLight) -> Plugin:
-    """Return a spot light. Mitsuba's falloff is linear in the angle; ours is represented by a projected texture."""
+    """Return a spot light. Mitsuba's falloff is linear in the angle; glTF's is represented by a projected texture."""
+    frame = _frame(light.position, light.direction, _up_for(light.direction))
+    plugin = {"type": "spot", "to_world": frame, "intensity": rgb(light.intensity), "cutoff_angle": light.outer_degrees}
+    if light.falloff == "angle":
+        return plugin | {"beam_width": light.inner_degrees}
     if light.outer_degrees > SPOT_DEGREES:
         raise UsageError(f"spot: only cones up to {SPOT_DEGREES} degrees from their axis are exported to Mitsuba")
     across = (np.arange(SPOT_TEXELS) * 2 + 1) / SPOT_TEXELS - 1
     off = np.hypot(across[:, None], across) * tan(radians(light.outer_degrees))
     inner, outer = cos(radians(light.inner_degrees)), cos(radians(light.outer_degrees))
     falloff = np.clip((1 / np.sqrt(1 + off**2) - outer) / (inner - outer), 0, 1) ** 2
-    return {
-        "type": "spot",
-        "to_world": _frame(light.position, light.direction, _up_for(light.direction)),
-        "intensity": rgb(light.intensity),
-        "cutoff_angle": light.outer_degrees,
+    return plugin | {
         "beam_width": light.outer_degrees,
         "texture": {
             "type": "bitmap",

@@ -101,6 +101,12 @@ def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(encoded <= 0.04045, encoded / 12.92, power).astype(np.float32)
 
 
+def srgb_from_linear(linear: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Encode linear values in [0, 1] to sRGB (IEC 61966-2-1); same shape and dtype."""
+    power = 1.055 * linear.astype(np.float64) ** (1 / 2.4) - 0.055
+    return np.where(linear <= 0.0031308, 12.92 * linear, power).astype(np.float32)
+
+
 def _colour_channels(names: str) -> list[int]:
     """Return the indices of red, green and blue among a file's channels."""
     return [0, 1, 2] if names.startswith("RGB") else [0, 0, 0]

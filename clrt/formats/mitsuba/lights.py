@@ -1,74 +1,58 @@
-"""Mitsuba's emitters without a shape: point, directional, constant and envmap."""
+"""Mitsuba's emitters without a shape: point, spot, directional and constant."""
 
 from __future__ import annotations
 
-from math import atan2, degrees
-from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
-
-from ...scene.lights import DirectionalLight, Light, PointLight
+from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ...scene.model import Environment
-from ..images.image_reader import read_picture
-from .values import Doubles, rgb
+from .environment_map import environment_map
+from .notes import Notes
+from .values import rgb
 from .xml import Plugin
 
-#: Minimum number of rows of an environment map, which is upsampled by an integer factor.
-ROWS = 1024
-#: Tolerance for an environment's transform to be a rotation about +Y.
-TURN = 1e-6
+#: Emitters that are the environment, and those of shapes, which at the top of a file are only referred to.
+ENVIRONMENTS = ("constant", "envmap")
+OF_SHAPES = ("area",)
 
 
-def light(plugin: Plugin) -> Light:
-    """Read a point or directional light. Raises UnsupportedError for others."""
+def light(plugin: Plugin, notes: Notes) -> Light | None:
+    """Read a point, spot or directional light. Raises UnsupportedError for others; None if they may be left out."""
+    to_world = plugin.transform("to_world")
+    plugin.used |= {"to_world", "sampling_weight"}
     if plugin.kind == "point":
-        x, y, z = plugin.point("position") or plugin.transform("to_world")[:3, 3].tolist()
-        plugin.used.add("to_world")
+        x, y, z = plugin.point("position") or to_world[:3, 3].tolist()
         return PointLight(position=(x, y, z), intensity=rgb(plugin.color("intensity", 1.0), emitted=True))
     if plugin.kind == "directional":
-        x, y, z = plugin.point("direction") or plugin.transform("to_world")[:3, 2].tolist()
-        plugin.used.add("to_world")
+        x, y, z = plugin.point("direction") or to_world[:3, 2].tolist()
         return DirectionalLight(direction=(x, y, z), irradiance=rgb(plugin.color("irradiance", 1.0), emitted=True))
-    plugin.refuse_kind("point, directional, constant, envmap, or area on a shape")
+    if plugin.kind == "spot":
+        return _spot(plugin, notes)
+    known = "point, spot, directional, constant, envmap, or area on a shape"
+    what = f'emitter type "{plugin.kind}" is not supported'
+    plugin.ignore()
+    notes.instead(plugin, what, f"use {known}", "it is left out")
+    return None
 
 
-def environment(plugin: Plugin) -> Environment:
-    """Read a constant or envmap emitter as the environment."""
-    if plugin.kind == "constant":
-        return Environment(color=rgb(plugin.color("radiance", 1.0), emitted=True))
-    plugin.used.add("mis_compensation")
-    image = rows_at_middles(read_picture(Path(plugin.value("filename", str, ""))))
-    return Environment(
-        image=image,
-        strength=plugin.value("scale", float, 1.0),
-        rotation_degrees=_turn(plugin, plugin.transform("to_world")),
+def _spot(plugin: Plugin, notes: Notes) -> SpotLight:
+    to_world = plugin.transform("to_world")
+    (x, y, z), (dx, dy, dz) = to_world[:3, 3].tolist(), to_world[:3, 2].tolist()
+    outer = plugin.value("cutoff_angle", float, 20.0)
+    inner = plugin.value("beam_width", float, 0.75 * outer)
+    if plugin.child("texture") is not None:
+        notes.instead(plugin, "has a texture", "leave it out", "it is left out", "spot, texture")
+    return SpotLight(
+        position=(x, y, z),
+        direction=(dx, dy, dz),
+        intensity=rgb(plugin.color("intensity", 1.0), emitted=True),
+        inner_degrees=inner,
+        outer_degrees=outer,
+        falloff="angle",
     )
 
 
-def _turn(plugin: Plugin, to_world: Doubles) -> float:
-    """Return the rotation about +Y in degrees."""
-    angle = atan2(to_world[0, 2], to_world[0, 0])
-    c, s = np.cos(angle), np.sin(angle)
-    if np.abs(to_world[:3, :3] - [[c, 0, s], [0, 1, 0], [-s, 0, c]]).max() > TURN:
-        plugin.refuse(
-            "is rotated about an axis other than y",
-            "rotate the scene and its camera so that y is up",
-            "envmap rotated about x or z",
-        )
-    return degrees(angle)
-
-
-def rows_at_middles(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Resample an environment map, (h, w, 3), to at least ROWS rows by linear interpolation.
-
-    Mitsuba's H rows lie at row/(H − 1) from pole to pole; clrt's h rows at (row + ½)/h.
-    """
-    cells = len(image) - 1
-    if cells < 1:
-        return image
-    count = cells * -(-ROWS // cells)
-    at = (np.arange(count) + 0.5) / count * cells
-    above = np.minimum(at.astype(int), cells - 1)
-    share = (at - above).astype(np.float32)[:, None, None]
-    return np.asarray(image[above] * (1 - share) + image[above + 1] * share, np.float32)
+def environment(plugin: Plugin, notes: Notes) -> Environment:
+    """Read a constant or envmap emitter as the environment."""
+    plugin.used.add("sampling_weight")
+    if plugin.kind == "constant":
+        return Environment(color=rgb(plugin.color("radiance", 1.0), emitted=True))
+    return environment_map(plugin, notes)

@@ -19,8 +19,11 @@ from ..models import read_model
 from ..ply.attributes import columns_of, coordinates_of
 from ..ply.elements import Columns, read_elements
 from ..ply.triangles import Triangles, faces_of
-from .materials import MaterialReader, ShapeMaterial, absorbing
+from .bsdfs import absorbing
+from .materials import MaterialReader, ShapeMaterial
+from .notes import Notes
 from .primitives import cube, cylinder, disk, rectangle, sphere
+from .serialized import read_serialized
 from .textures import Attribute, TextureReader
 from .values import Doubles
 from .xml import Plugin, UnsupportedError
@@ -32,9 +35,11 @@ PRIMITIVES: dict[str, Callable[[], Mesh]] = {
     "cylinder": cylinder,
     "sphere": sphere,
 }
-FILES = ("obj", "ply")
+FILES = ("obj", "ply", "serialized")
 #: Tolerance for a transform to be a rotation, translation and uniform scale.
 UNEVEN = 1e-5
+#: Maximum number of spheres and disks that become triangles, of 2 MB each.
+MOST_ROUND = 256
 Part = Mesh | Sphere
 Attributes = Mapping[str, FloatArray]
 
@@ -46,10 +51,14 @@ class ShapeReader:
     features of these, by the name of the mesh or sphere.
     """
 
-    def __init__(self, textures: TextureReader, materials: MaterialReader, stand_in: Material | None) -> None:
+    def __init__(
+        self, textures: TextureReader, materials: MaterialReader, notes: Notes, stand_in: Material | None
+    ) -> None:
         self._textures = textures
         self._materials = materials
+        self._notes = notes
         self._stand_in = stand_in
+        self._round = 0
         self.missing: dict[str, list[str]] = {}
         self._groups: dict[Plugin, list[Part]] = {}
 
@@ -62,28 +71,36 @@ class ShapeReader:
 
     def _shape(self, plugin: Plugin) -> Iterator[Part]:
         if plugin.kind not in (*PRIMITIVES, *FILES):
-            plugin.refuse_kind(", ".join((*PRIMITIVES, *FILES, "shapegroup", "instance")))
+            known = ", ".join((*PRIMITIVES, *FILES, "shapegroup", "instance"))
+            what = f'shape type "{plugin.kind}" is not supported'
+            plugin.ignore()
+            self._notes.instead(plugin, what, f"use {known}", "it is left out")
+            return
+        if _is_invisible(plugin):
+            return
         to_world = plugin.transform("to_world")
         look = self._lit(plugin, self._look(plugin))
-        if plugin.value("flip_normals", bool, False):
-            plugin.refuse("flip_normals is not supported", "reverse the shape's faces", "flip_normals")
+        flips = plugin.value("flip_normals", bool, False)
         mirrored = bool(np.linalg.det(to_world[:3, :3]) < 0)
         if plugin.kind == "sphere":
             to_world = to_world @ _ball(plugin)
-            inwards = mirrored and (any(look.material.radiance) or "TRANSMISSION" in look.material.features())
+            flips ^= mirrored
+            inwards = flips and (any(look.material.radiance) or "TRANSMISSION" in look.material.features())
             if not inwards and (ball := _sphere(to_world, look, plugin.where)):
                 yield ball
                 return
         elif plugin.kind == "cylinder":
             to_world = to_world @ _between(plugin)
         if plugin.kind in PRIMITIVES:
-            mesh = PRIMITIVES[plugin.kind]()
-            turns = mirrored and plugin.kind == "sphere"
-            pieces: list[tuple[Mesh, Attributes]] = [(_turned(mesh) if turns else mesh, {})]
+            self._round += plugin.kind in ("sphere", "disk")
+            if self._round > MOST_ROUND:
+                raise SceneError(f"scene: more than {MOST_ROUND} spheres and disks are tessellated; write .ply files")
+            pieces: list[tuple[Mesh, Attributes]] = [(PRIMITIVES[plugin.kind](), {})]
         else:
             pieces = list(_from_file(plugin, mirrored))
         for mesh, attributes in pieces:
-            yield _dressed(transform_mesh(mesh, to_world), look, attributes, plugin)
+            placed = transform_mesh(_turned(mesh) if flips else mesh, to_world)
+            yield _dressed(placed, look, attributes, plugin)
 
     def _look(self, plugin: Plugin) -> ShapeMaterial:
         """Return the material of the shape's BSDF and interior medium; or `stand_in` if it is not supported."""
@@ -93,21 +110,37 @@ class ShapeReader:
             if self._stand_in is None:
                 raise
             self.missing[plugin.where] = error.features
+            plugin.ignore()
             return ShapeMaterial(self._stand_in)
 
     def _own_look(self, plugin: Plugin) -> ShapeMaterial:
         bsdfs = plugin.all("bsdf")
         grey = 0.0 if plugin.all("emitter") else 0.5  # Mitsuba's default for a shape without a BSDF
         look = self._materials.look(bsdfs[-1]) if bsdfs else ShapeMaterial(Diffuse(color=(grey, grey, grey)))
-        for medium in plugin.all("medium"):
-            look = look._replace(material=absorbing(look.material, medium))
+        plugin.all("medium")
+        for name, medium in plugin.children:
+            if medium.tag == "medium":
+                look = look._replace(material=self._filled(look.material, medium, name))
         return look
+
+    def _filled(self, material: Material, medium: Plugin, name: str) -> Material:
+        """Return the material with a medium inside, which only glass may have, and only one that absorbs."""
+        if name != "exterior" and (clear := absorbing(material, medium)):
+            return clear
+        what = f"is a {medium.kind} medium that scatters, or is not inside glass"
+        medium.ignore()
+        self._notes.instead(medium, what, "leave it out", "it is left out", f"{medium.kind} medium")
+        return material
 
     def _lit(self, plugin: Plugin, look: ShapeMaterial) -> ShapeMaterial:
         """Return the look with the emission of the shape's area emitter."""
         for emitter in plugin.all("emitter"):
+            emitter.used.add("sampling_weight")
             if emitter.kind != "area":
-                emitter.refuse_kind("area on a shape")
+                what = f'emitter type "{emitter.kind}" of a shape is not supported'
+                emitter.ignore()
+                self._notes.instead(emitter, what, "use area", "it is left out")
+                continue
             radiance = self._textures.color(emitter, "radiance", 1.0, emitted=True)
             if isinstance(radiance, Attribute):
                 emitter.refuse("radiance is an attribute", "write a color or a bitmap", "radiance by an attribute")
@@ -117,7 +150,7 @@ class ShapeReader:
     def _instances(self, plugin: Plugin) -> Iterator[Instance | Sphere]:
         groups = plugin.all("shape")
         if len(groups) != 1 or groups[0].kind != "shapegroup":
-            raise SceneError(f"{plugin.where}: does not refer to a shapegroup; write one <ref> to one")
+            raise SceneError(f"{plugin.at}: does not refer to a shapegroup; write one <ref> to one")
         to_world = plugin.transform("to_world")
         if groups[0] not in self._groups:
             self._groups[groups[0]] = [part for shape in groups[0].all("shape") for part in self._shape(shape)]
@@ -132,6 +165,14 @@ class ShapeReader:
             if moved is None:
                 plugin.refuse("stretches a sphere", "scale uniformly", "stretched sphere")
             yield moved
+
+
+def _is_invisible(plugin: Plugin) -> bool:
+    """Return whether light passes the shape, which only bounds a medium."""
+    if [each.kind for each in plugin.all("bsdf")] != ["null"] or plugin.all("emitter") or plugin.all("medium"):
+        return False
+    plugin.ignore()
+    return True
 
 
 def _ball(plugin: Plugin) -> Doubles:
@@ -149,7 +190,7 @@ def _between(plugin: Plugin) -> Doubles:
     radius, along = plugin.value("radius", float, 1.0), end - start
     x, y, z = unit(along).tolist()
     if not along.any():
-        raise SceneError(f"{plugin.where}: p0 and p1 are the same point; move one")
+        raise SceneError(f"{plugin.at}: p0 and p1 are the same point; move one")
     sign = 1.0 if z >= 0 else -1.0
     a = -1 / (sign + z)
     frame = np.eye(4)
@@ -186,6 +227,9 @@ def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attribute
     flat = plugin.value("face_normals", bool, False)
     downward = plugin.value("flip_tex_coords", bool, plugin.kind == "obj")
     own = _ply(path) if plugin.kind == "ply" else None
+    if plugin.kind == "serialized":
+        mesh, flat_itself = read_serialized(path, plugin.value("shape_index", int, 0))
+        own, flat = (mesh, {}), flat or flat_itself
     for mesh, attributes in [own] if own else [(mesh, {}) for mesh in read_model(path).meshes]:
         if mesh.uv is not None and downward != (own is None):
             mesh.uv[:, 1] = 1 - mesh.uv[:, 1]
@@ -238,13 +282,13 @@ def _dressed(mesh: Mesh, look: ShapeMaterial, attributes: Attributes, plugin: Pl
     """Return the mesh with its material, and the colors of an attribute; a face attribute splits shared vertices."""
     mesh = replace(mesh, material=look.material, name=plugin.where)
     if mesh.uv is None and look.material.textures():
-        raise SceneError(f"{plugin.where}: has a texture but no texture coordinates; add them to the file")
+        raise SceneError(f"{plugin.at}: has a texture but no texture coordinates; add them to the file")
     if look.attribute is None:
         return mesh
     name, low, high = look.attribute
     if name not in attributes:
         raise SceneError(
-            f'{plugin.where}: has no attribute "{name}"; the file has {", ".join(sorted(attributes)) or "none"}'
+            f'{plugin.at}: has no attribute "{name}"; the file has {", ".join(sorted(attributes)) or "none"}'
         )
     colors = (np.array(low) + attributes[name] * np.subtract(high, low)).clip(0, 1).astype(np.float32)
     if name.startswith("vertex_"):

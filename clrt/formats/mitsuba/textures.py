@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from math import atan2, degrees, hypot
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ...errors import SceneError
 from ...scene.materials.textures import Picture, Texture, Wrap
-from ..images.image_reader import linear_from_srgb, read_texels
+from ..images.image_reader import linear_from_srgb, read_texels, srgb_from_linear
+from .notes import Notes
 from .values import Doubles, rgb
 from .xml import Plugin
 
 WRAPS: dict[str, Wrap] = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp"}
-FILTERS: dict[str, Literal["linear", "nearest"]] = {"bilinear": "linear", "nearest": "nearest"}
+#: Mitsuba 0.x's filters of several texels per pixel, too; here there are several samples per pixel.
+FILTERS: dict[str, Literal["linear", "nearest"]] = {
+    "bilinear": "linear",
+    "nearest": "nearest",
+    "trilinear": "linear",
+    "ewa": "linear",
+}
+#: Maximum number of bytes of converted textures.
+MOST_BAKED = 2**31
+#: Gamma of Mitsuba 0.x that is taken for sRGB, as is −1.
+SRGB = 2.2
+#: Conversion of texels from or to sRGB.
+Curve = Literal["", "decode", "encode"]
 #: Luminance weights of Rec. 709.
 LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
 #: Tolerance for the columns of a texture's transform to be orthogonal, as the cosine of their angle.
@@ -32,8 +48,10 @@ class Attribute(NamedTuple):
 class TextureReader:
     """Reader for the textures of one scene; an image that several textures use is read once."""
 
-    def __init__(self) -> None:
-        self._pictures: dict[tuple[str, str], Picture] = {}
+    def __init__(self, notes: Notes) -> None:
+        self._notes = notes
+        self._baked = 0
+        self._pictures: dict[tuple[str, Curve, bool], Picture] = {}
 
     def color(self, owner: Plugin, name: str, default: float, *, emitted: bool = False) -> Any:
         """Read a color: three numbers, a Texture or an Attribute."""
@@ -73,33 +91,59 @@ class TextureReader:
     def _bitmap(self, plugin: Plugin, use: Literal["color", "number", "normal"]) -> Texture:
         if plugin.kind != "bitmap":
             plugin.refuse_kind("bitmap, checkerboard or mesh_attribute")
-        raw = plugin.value("raw", bool, False)
-        if raw != (use == "normal") and use != "number":
-            plugin.refuse(
-                f"is {'raw' if raw else 'not raw'}",
-                f"write raw = {str(not raw).lower()}, for a {use}",
-                f"bitmap, raw = {str(raw).lower()}, for a {use}",
-            )
-        plugin.used |= {"format", "accel"}  # these affect only how Mitsuba stores the texels
+        raw = self._is_raw(plugin)
+        if use == "normal" and not raw:
+            plugin.refuse("is not raw", "write raw = true, for a normal", "bitmap, raw = false, for a normal")
+        plugin.used |= {"format", "accel", "max_anisotropy", "cache"}  # affect only how Mitsuba stores the texels
         path = plugin.value("filename", str, "")
         place = _placed(plugin, plugin.transform("to_uv"))
-        wrap = WRAPS.get(plugin.value("wrap_mode", str, "repeat"))
+        both = plugin.value("wrap_mode", str, "repeat")
+        wraps = [WRAPS.get(plugin.value(f"wrap_mode_{axis}", str, both)) for axis in "uv"]
         kind = FILTERS.get(plugin.value("filter_type", str, "bilinear"))
-        if wrap is None or kind is None:
+        if wraps[0] is None or wraps[1] is None or kind is None:
             plugin.refuse("its wrap_mode or filter_type is unknown", f"write {', '.join(WRAPS)}; {', '.join(FILTERS)}")
-        linear = "linear" if use == "number" and not raw else ""
-        return Texture(picture=self._picture(path, linear), wrap=(wrap, wrap), filter=kind, **place)
+        curve: Curve = "" if use == "normal" else "" if raw == (use == "number") else "encode" if raw else "decode"
+        picture = self._picture(path, curve, grey=use == "number")
+        return Texture(picture=picture, wrap=(wraps[0], wraps[1]), filter=kind, **place)
 
-    def _picture(self, file: str, curve: str) -> Picture:
-        """Read a file's texels: unchanged, or as linear luminance of 8 bits in all channels."""
-        if (file, curve) not in self._pictures:
+    def _is_raw(self, plugin: Plugin) -> bool:
+        """Return whether the values are linear, by `raw`, or by Mitsuba 0.x's `gamma`."""
+        gamma = plugin.value("gamma", float, 1.0 if plugin.value("raw", bool, False) else SRGB)
+        if gamma not in (1, SRGB, -1):
+            self._notes.instead(plugin, f"gamma is {gamma:g}", "write 1 or leave it out", "sRGB is used", "gamma")
+        return gamma == 1
+
+    def _picture(self, file: str, curve: Curve, *, grey: bool) -> Picture:
+        """Read a file's texels of 8 bits, decoded from sRGB or encoded; grey: their luminance in all channels."""
+        if (file, curve, grey) not in self._pictures:
             path = Path(file)
             texels = read_texels(path)
+            values = np.asarray(texels[..., :3] / 255, np.float32)
             if curve:
-                linear = linear_from_srgb(np.asarray(texels[..., :3] / 255, np.float32)) @ LUMINANCE
-                texels = np.repeat(np.round(linear * 255).astype(np.uint8)[..., None], 4, axis=2)
-            self._pictures[file, curve] = Picture(texels, path.stem)
-        return self._pictures[file, curve]
+                values = linear_from_srgb(values) if curve == "decode" else srgb_from_linear(values)
+            if grey:
+                values = np.repeat((values @ LUMINANCE.astype(np.float32))[..., None], 3, axis=2)
+            if curve or grey:
+                texels = np.concatenate([np.round(values * 255).astype(np.uint8), texels[..., 3:]], axis=2)
+            self._pictures[file, curve, grey] = Picture(texels, path.stem)
+        return self._pictures[file, curve, grey]
+
+    def baked(
+        self, texture: Texture, use: Literal["color", "number"], function: Callable[[Doubles], Doubles]
+    ) -> Texture:
+        """Return the texture with a function applied to its values, to 8 bits."""
+        values = np.arange(256, dtype=np.float32) / np.float32(255)
+        levels = linear_from_srgb(values) if use == "color" else values
+        factors = np.broadcast_to(texture.factor, 3)
+        table = function(np.clip(levels[:, None] * factors, 0, 1).astype(np.float64)).astype(np.float32)
+        table = np.round((srgb_from_linear(table) if use == "color" else table) * 255).astype(np.uint8)
+        self._baked += texture.picture.texels.nbytes
+        if self._baked > MOST_BAKED:
+            raise SceneError(f"scene: more than {MOST_BAKED >> 30} GiB of textures are converted; use smaller images")
+        texels = texture.picture.texels.copy()
+        for channel in range(3):
+            texels[..., channel] = table[texels[..., channel], channel]
+        return replace(texture, picture=Picture(texels, texture.picture.name), factor=1.0)
 
     def _checkerboard(self, plugin: Plugin, *, encoded: bool) -> Texture:
         """Return 2x2 texels, with factors that make the brighter color exact and the other as close as 8 bits allow."""
@@ -116,6 +160,14 @@ class TextureReader:
         place = _placed(plugin, plugin.transform("to_uv"))
         factor = (factors[0], factors[1], factors[2]) if encoded else factors[0]
         return Texture(picture=Picture(texels, "checkerboard"), factor=factor, filter="nearest", **place)
+
+
+def mean_of(number: float | Texture) -> float:
+    """Return a number, or the mean of a texture that stands for one."""
+    if not isinstance(number, Texture):
+        return number
+    factor = number.factor if isinstance(number.factor, float) else 1.0
+    return float(number.picture.texels[..., 0].mean()) / 255 * factor
 
 
 def _pair(first: float, second: float, encoded: bool) -> tuple[int, int, float]:

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
-from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...scene.geometry.transform import scaling, translation, unit
-from ...scene.spectra import rgb_of_spectrum
+from ...scene.spectra import LONGEST, SHORTEST, rgb_of_spectrum
+from .elements import Element
 
 Doubles = NDArray[np.float64]
 Attributes = Mapping[str, str]
+
+
+#: Planck's constant in J·s, the speed of light in m/s, Boltzmann's constant in J/K; and an exponent with a finite exp.
+H, C, BOLTZMANN, LARGEST_EXPONENT = 6.62607015e-34, 299792458.0, 1.380649e-23, 700.0
+#: Number of characters of a value in a message.
+SHOWN = 60
+HEXADECIMAL = re.compile("#" + "([0-9a-fA-F]{2})" * 3)
 
 
 class Color(NamedTuple):
@@ -63,20 +71,31 @@ def boolean(text: str) -> bool:
 
 def color(text: str) -> Color:
     """Parse three numbers, one for grey, or a hexadecimal sRGB color such as #ff8000."""
-    if text.strip().startswith("#"):
-        from ..images.image_reader import linear_from_srgb
-
-        encoded = np.array([int(text.strip()[i : i + 2], 16) for i in (1, 3, 5)], np.float32)
-        red, green, blue = linear_from_srgb(encoded / np.float32(255)).tolist()
-        return Color((red, green, blue))
+    if "#" in text:
+        return encoded_color(text)
     values = numbers(text)
     red, green, blue = values * 3 if len(values) == 1 else values
     return Color((red, green, blue))
 
 
-def spectrum(text: str) -> Spectrum:
-    """Parse a constant, or pairs of a wavelength and a value."""
+def encoded_color(text: str) -> Color:
+    """Parse a color encoded in sRGB: three numbers, one for grey, or a hexadecimal one."""
+    from ..images.image_reader import linear_from_srgb
+
+    if found := HEXADECIMAL.fullmatch(text.strip()):
+        values = [int(digits, 16) / 255 for digits in found.groups()]
+    else:
+        values = numbers(text)
+        values = values * 3 if len(values) == 1 else values
+    red, green, blue = linear_from_srgb(np.array(values, np.float32)).tolist()
+    return Color((red, green, blue))
+
+
+def spectrum(text: str) -> Spectrum | Color:
+    """Parse a constant, pairs of a wavelength and a value, or, as in Mitsuba 0.x, three numbers for a linear color."""
     if ":" not in text:
+        if len(numbers(text)) == 3:
+            return color(text)
         (value,) = numbers(text)
         return Spectrum((), (value,))
     pairs = [numbers(pair.replace(":", " ")) for pair in text.replace(",", " ").split()]
@@ -84,6 +103,18 @@ def spectrum(text: str) -> Spectrum:
     if np.any(np.diff(wavelengths) <= 0) or len(wavelengths) < 2:
         raise ValueError(text)
     return Spectrum(wavelengths, values)
+
+
+def blackbody(temperature: str, scale: str) -> Color:
+    """Return the radiance of a black body in W·m⁻²·sr⁻¹·nm⁻¹, by its temperature in kelvin (Planck's law)."""
+    (kelvin,), (factor,) = numbers(temperature.strip().removesuffix("K")), numbers(scale)
+    if not kelvin > 0:
+        raise ValueError(temperature)
+    nm = np.arange(SHORTEST, LONGEST + 1)
+    exponent = np.minimum(H * C / (nm * 1e-9 * BOLTZMANN * kelvin), LARGEST_EXPONENT)
+    radiance = 2e-9 * H * C**2 / (nm * 1e-9) ** 5 / np.expm1(exponent)
+    red, green, blue = (factor * part for part in rgb_of_spectrum(nm.tolist(), radiance.tolist(), lit=False))
+    return Color((red, green, blue))
 
 
 def vector(attributes: Attributes, missing: float = 0.0) -> tuple[float, float, float]:
@@ -148,13 +179,19 @@ STEPS: dict[str, Callable[[Attributes], Doubles]] = {
 }
 
 Value = bool | int | float | str | Color | Spectrum | tuple[float, float, float] | Doubles
-_READERS: dict[str, tuple[Callable[[str], Value], str]] = {
-    "float": (lambda text: float(numbers(text)[0]), "a number"),
-    "integer": (integer, "an integer"),
-    "boolean": (boolean, "true or false"),
-    "string": (str, "a string"),
-    "rgb": (color, "three numbers"),
-    "spectrum": (spectrum, 'a number, or pairs such as "400:0.2, 700:0.8"'),
+#: Readers of the elements with a plain value, and what to write.
+READERS: dict[str, tuple[Callable[[Attributes], Value], str]] = {
+    "float": (lambda attributes: float(numbers(attributes["value"])[0]), "a number"),
+    "integer": (lambda attributes: integer(attributes["value"]), "an integer"),
+    "boolean": (lambda attributes: boolean(attributes["value"]), "true or false"),
+    "string": (lambda attributes: attributes["value"], "a string"),
+    "rgb": (lambda attributes: color(attributes["value"]), "three numbers"),
+    "srgb": (lambda attributes: encoded_color(attributes["value"]), "three numbers, or #rrggbb"),
+    "spectrum": (lambda attributes: spectrum(attributes["value"]), 'a number, or pairs such as "400:0.2, 700:0.8"'),
+    "blackbody": (
+        lambda attributes: blackbody(attributes["temperature"], attributes.get("scale", "1")),
+        'a temperature in kelvin such as "5000"',
+    ),
 }
 
 
@@ -166,12 +203,12 @@ def value_of(element: Element, where: str) -> Value:
             return vector(attributes)
         if element.tag == "transform":
             return transform([(step.tag, step.attrib) for step in element])
-        return _READERS[element.tag][0](attributes["value"])
+        return READERS[element.tag][0](attributes)
     except (ValueError, KeyError, IndexError):
         wanted = (
-            _READERS[element.tag][1]
-            if element.tag in _READERS
+            READERS[element.tag][1]
+            if element.tag in READERS
             else (f"steps from {', '.join(STEPS)}" if element.tag == "transform" else "three numbers")
         )
         given = attributes.get("value", "of these steps" if element.tag == "transform" else "of these attributes")
-        raise SceneError(f'{where}: <{element.tag}> "{given}" cannot be read; write {wanted}') from None
+        raise SceneError(f'{where}: <{element.tag}> "{given:.{SHOWN}}" cannot be read; write {wanted}') from None

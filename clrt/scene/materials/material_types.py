@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import log
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 from ..fields.limits import Ge, Gt, Le
 from .dielectric_energy import ROWS, tables
@@ -35,20 +35,31 @@ class Diffuse(Material):
 
 @dataclass(frozen=True, kw_only=True)
 class Conductor(Material):
-    """Metal with a measured complex index of refraction eta + i·k per channel and a GGX microfacet distribution.
+    """Metal with a measured complex index of refraction eta + i·k per channel and a microfacet distribution.
 
-    `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². Single scattering only.
+    `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². `reflectance`, which
+    measured metals do not have, multiplies what is reflected. Single scattering only.
     """
 
     kernel: ClassVar[str] = "conductor"
+    parts: ClassVar[tuple[str, ...]] = ("BECKMANN",)
     preset: ConductorPreset = "gold"
     eta: tuple[Index, Index, Index] | None = None
     k: tuple[Extinction, Extinction, Extinction] | None = None
     roughness: Unit | Texture = 0.3
+    reflectance: Albedo | Texture = (1.0, 1.0, 1.0)
+    distribution: Literal["ggx", "beckmann"] = "ggx"
 
     def parameters(self) -> dict[str, Parameter]:
         eta, k = CONDUCTORS[self.preset]
-        return {"eta": self.eta or eta, "k": self.k or k, "roughness": self.roughness}
+        values: dict[str, Parameter] = {"eta": self.eta or eta, "k": self.k or k, "roughness": self.roughness}
+        has = self.features()
+        values |= {"reflectance": self.reflectance} if "TINTED_CONDUCTOR" in has else {}
+        return values | ({"beckmann": 1.0} if "BECKMANN" in has else {})
+
+    def features(self) -> frozenset[str]:
+        has = {"TINTED_CONDUCTOR": self.reflectance != (1.0, 1.0, 1.0), "BECKMANN": self.distribution == "beckmann"}
+        return frozenset(name for name, present in has.items() if present)
 
     def conflicts(self) -> list[str]:
         if (self.eta is None) == (self.k is None):

@@ -1,4 +1,4 @@
-"""Conductor with a complex index of refraction and GGX microfacets: F·D·G/(4·cos·cos), one bounce."""
+"""Conductor with a complex index of refraction and microfacets: F·D·G/(4·cos·cos), one bounce."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from clrt.scene.materials.presets import CONDUCTORS
 
 from ..surface import Surface
 from ..vectors import Doubles, dot
+from .beckmann import reflection as beckmann_reflection
 from .fresnel import conductor
 from .ggx import VisibleNormals, alpha_of, reflection
 from .scattering import Cosine, Mixed, halfway
@@ -18,9 +19,11 @@ class Metal(Mixed):
     def __init__(self, material: Conductor, at: Surface) -> None:
         eta, k = CONDUCTORS[material.preset]
         self._eta, self._k = np.array(material.eta or eta), np.array(material.k or k)
+        self._reflectance = at.color(material.reflectance)
         self._alpha = alpha_of(at.number(material.roughness))
+        self._reflection = beckmann_reflection if material.distribution == "beckmann" else reflection
         self.strategies = [VisibleNormals(self._alpha), Cosine()]
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
         fresnel = conductor(np.abs(dot(wo, halfway(wo, wi))), self._eta, self._k)
-        return fresnel * reflection(wo, wi, self._alpha)[:, None]
+        return self._reflectance * fresnel * self._reflection(wo, wi, self._alpha)[:, None]
