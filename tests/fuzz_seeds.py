@@ -26,6 +26,7 @@ from .formats.test_meshes import (
 )
 from .formats.test_ply import XYZ, Element, written
 from .formats.test_stl import binary
+from .formats.threemf_files import painted
 from .fuzz import FORMATS, LARGEST, OBJ
 from .scene.shapes import icosphere
 
@@ -137,6 +138,7 @@ def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
         "textured.glb": textured((folder / "wood.jpg").read_bytes()),
     }.items():
         document.write(folder / name)
+    painted().write(folder / "a.3mf")
     for place in more:
         for file in sorted(place.rglob("*")):
             if file.suffix == ".bin":  # under the name that its model refers to

@@ -88,10 +88,10 @@ def _load_model(
     choice, moving: see `load`.
     """
     model = read_model(path, choice=choice)
-    placing = {"up": up or model.up, "unit": unit or "m"}
+    placing = {"up": up or model.up, "unit": unit or model.unit}
     placing = {key: value for key, value in placing.items() if value != getattr(MeshTable, key)}
     if placing:
-        model = placed_animation(model, upright(up or model.up, unit or "m"))
+        model = placed_animation(model, upright(up or model.up, unit or model.unit))
     if model.converted_from is not None:
         log.warning(
             "%s: %s; --light-unit radiometric takes them as W/sr and W/m²", path, CONVERTED[model.converted_from]

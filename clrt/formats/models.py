@@ -22,7 +22,7 @@ from ..scene.geometry.instancing import baked
 from ..scene.geometry.normals import Normals, choose_normals
 from ..scene.materials.material import BELOW_ONE
 from ..scene.materials.material_types import Diffuse
-from ..scene.model import Mesh, Model
+from ..scene.model import Instance, Mesh, Model
 from ..scene.validation.validate import mesh_problems
 from .images.image_reader import linear_from_srgb
 from .model_choice import DEFAULT, ModelChoice
@@ -86,16 +86,26 @@ def _off(path: Path) -> dict[str, Any]:
     return parse_off(path)
 
 
+def _3mf(path: Path) -> dict[str, Any]:
+    from .threemf.reader import parse_3mf
+
+    return parse_3mf(path)
+
+
 def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals], Model]:
     """Return a reader from a parser, which returns the keyword arguments of trimesh's classes for one mesh (vertices,
-    faces, vertex_normals, uv, vertex_colors), or for several by name in `geometry`, and which axis is `up` unless it is
-    y; it raises SceneError for a malformed file."""
+    faces, vertex_normals, uv, vertex_colors), or for several by name in `geometry`.
+
+    It also returns which axis is `up` unless it is y, the `unit` unless it is m, and `places`, pairs of a mesh's name
+    and a matrix (4, 4), unless each is placed once as it is. It raises SceneError for a malformed file.
+    """
 
     def read(path: Path, normals: Normals) -> Model:
         try:
             with np.errstate(all="ignore"):  # values that are not finite are reported
                 parts = parse(path)
-                return Model(meshes=_meshes(path, parts, normals), up=parts.get("up", "y"))
+                meshes, instances = _placed(_meshes(path, parts, normals), parts.get("places"))
+                return Model(meshes=meshes, instances=instances, up=parts.get("up", "y"), unit=parts.get("unit", "m"))
         except SceneError as error:
             raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
@@ -110,6 +120,7 @@ FORMATS: dict[str, Callable[..., Model]] = {
     ".ply": of_parts(_ply),
     ".stl": of_parts(_stl),
     ".off": of_parts(_off),
+    ".3mf": of_parts(_3mf),
 }
 SUFFIXES = tuple(FORMATS)
 #: Formats whose readers' last argument is a ModelChoice.
@@ -131,6 +142,18 @@ def _meshes(path: Path, parts: dict[str, Any], normals: Normals) -> list[Mesh]:
     if problems:
         raise SceneError(problems)
     return meshes
+
+
+def _placed(
+    meshes: list[Mesh], places: list[tuple[str, NDArray[np.float64]]] | None
+) -> tuple[list[Mesh], list[Instance]]:
+    """Return the meshes in world coordinates, or as instances where these save memory."""
+    if places is None:
+        return meshes, []
+    from .gltf.instancing import shown  # most formats have no places
+
+    by_name = {mesh.name: mesh for mesh in meshes}
+    return shown((by_name[name], matrix) for name, matrix in places if name in by_name)
 
 
 def _mesh(path: Path, name: str, piece: dict[str, Any], normals: Normals) -> Mesh:

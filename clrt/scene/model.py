@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ClrtError
 from .animation import Animation, ModelAnimation
-from .axes_and_units import Axis, LightUnit
+from .axes_and_units import Axis, LightUnit, Unit
 from .cameras import Camera as Camera
 from .fields.limits import Gt
 from .fields.number_arrays import real_array, whole_array
@@ -91,7 +91,7 @@ class Model:
 
     - animation: the file's first one, or the one that was chosen
     - contents: names of all that can be chosen, by kind: scenes, animations, variants
-    - up: which of the file's axes points up
+    - up, unit: which of the file's axes points up, and the unit of its lengths
     - converted_from: the unit of the lights in the file, if it was guessed and they were converted
     """
 
@@ -102,6 +102,7 @@ class Model:
     animation: ModelAnimation | None = None
     contents: Mapping[str, Sequence[str]] = field(default_factory=dict)
     up: Axis = "y"
+    unit: Unit = "m"
     converted_from: LightUnit | None = None
 
 

@@ -1,5 +1,5 @@
-"""Decoding of images and compressed meshes in a child process, since the libraries may crash, hang or exhaust memory if
-a file is damaged.
+"""Decoding of images, compressed meshes, 3MF and USD files in a child process, since the libraries may crash, hang or
+exhaust memory if a file is damaged.
 
 The process starts with the first file, is reused for later ones, and exits after being idle for a while.
 """
@@ -35,7 +35,7 @@ _running: _Process | None = None
 def decode(kind: str, source: Path | bytes, suffix: str = "") -> tuple[Arrays, dict[str, Any]]:
     """Decode a file, or bytes of a file with the name suffix `suffix`, and return its arrays and other facts.
 
-    kind: a function of scene.decoding. Raises SceneError with its message, or with how the process ended.
+    kind: one of decoder_process.KINDS or MODULES. Raises SceneError with its message, or with how the process ended.
     """
     try:
         if isinstance(source, Path):

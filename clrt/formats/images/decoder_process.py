@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import suppress
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -138,6 +139,14 @@ def draco(file: str) -> Found:
 
 
 KINDS: dict[str, Callable[[str], Found]] = {"picture": picture, "draco": draco}
+#: Modules whose function `decode` decodes further kinds of file.
+MODULES = {"3mf": "clrt.formats.threemf.package", "usd": "clrt.formats.usd.stage"}
+
+
+def _decoder(kind: str) -> Callable[[str], Found]:
+    """Return the function that decodes files of a kind."""
+    function: Callable[[str], Found] = KINDS.get(kind) or import_module(MODULES[kind]).decode
+    return function
 
 
 def main() -> None:
@@ -159,7 +168,7 @@ def _answer(replies: Any, kind: str, file: str) -> None:
     arrays: dict[str, NDArray[Any]] = {}
     facts: dict[str, Any] = {}
     try:
-        arrays, facts = KINDS[kind](file)
+        arrays, facts = _decoder(kind)(file)
         reply: dict[str, Any] = {"facts": facts}
     except MemoryError:
         reply = {"error": "it needs too much memory"}
