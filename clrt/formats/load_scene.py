@@ -101,12 +101,12 @@ def _load_model(
     camera = next(iter(model.cameras.values()), None) if angle is None else None
     sun = transform_light(SUN, turn) if angle else SUN
     return Scene(
-        meshes=model.meshes,
+        meshes=model.meshes + model.emitters,
         instances=model.instances,
         camera=camera or frame(*_framed(model, moving or choice.animation is not None), turn),
         cameras=model.cameras,
-        environment=default_sky(),
-        lights=model.lights or [sun],
+        environment=model.environment or default_sky(),
+        lights=model.lights if model.lights or model.emitters or model.environment else [sun],
         name=name_of(path),
         animation=model.animation,
         source=source_of_model(path, model, placing, whole=replace(choice, light_unit=None) == DEFAULT),

@@ -40,8 +40,8 @@ def read_mesh(path: StrPath, normals: Normals = "file") -> list[Mesh]:
 def read_model(path: StrPath, normals: Normals = "file", choice: ModelChoice = DEFAULT) -> Model:
     """Read a model file: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
 
-    Polygons are triangulated. `normals`: see `choose_normals`; choice: for glTF files. Raises SceneError naming the
-    file, the mesh, and the index or vertex that is wrong.
+    Polygons are triangulated. `normals`: see `choose_normals`; choice: for glTF and USD files. Raises SceneError naming
+    the file, the mesh, and the index or vertex that is wrong.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -60,6 +60,12 @@ def _gltf(path: Path, normals: Normals, choice: ModelChoice) -> Model:
     from .gltf.reader import read_gltf
 
     return read_gltf(path, normals, choice)
+
+
+def _usd(path: Path, normals: Normals, choice: ModelChoice) -> Model:
+    from .usd.reader import read_usd
+
+    return read_usd(path, normals, choice)
 
 
 def _obj(path: Path) -> dict[str, Any]:
@@ -112,6 +118,7 @@ def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals
     return read
 
 
+USD = (".usd", ".usda", ".usdc", ".usdz")
 #: Readers of model files by suffix, which raise SceneError naming the file.
 FORMATS: dict[str, Callable[..., Model]] = {
     ".glb": _gltf,
@@ -121,10 +128,11 @@ FORMATS: dict[str, Callable[..., Model]] = {
     ".stl": of_parts(_stl),
     ".off": of_parts(_off),
     ".3mf": of_parts(_3mf),
+    **dict.fromkeys(USD, _usd),
 }
 SUFFIXES = tuple(FORMATS)
 #: Formats whose readers' last argument is a ModelChoice.
-CHOOSING = {".glb", ".gltf"}
+CHOOSING = {".glb", ".gltf", *USD}
 
 
 def _meshes(path: Path, parts: dict[str, Any], normals: Normals) -> list[Mesh]:

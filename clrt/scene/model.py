@@ -89,6 +89,8 @@ class Instance:
 class Model:
     """Content of a model file: meshes or instances, at least one, cameras by name in file order, and lights.
 
+    - emitters: lights with a surface, which are not part of the model itself
+    - environment: the light from all around, if the file has one
     - animation: the file's first one, or the one that was chosen
     - contents: names of all that can be chosen, by kind: scenes, animations, variants
     - up, unit: which of the file's axes points up, and the unit of its lengths
@@ -99,6 +101,8 @@ class Model:
     instances: list[Instance] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
     lights: list[Light] = field(default_factory=list)
+    emitters: list[Mesh] = field(default_factory=list)
+    environment: Environment | None = None
     animation: ModelAnimation | None = None
     contents: Mapping[str, Sequence[str]] = field(default_factory=dict)
     up: Axis = "y"

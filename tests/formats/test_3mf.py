@@ -183,7 +183,7 @@ def test_damaged_files_end_in_one_error(tmp_path: Path) -> None:
         "is not a ZIP archive": b"PK\3\4 not",
         "cannot be read as 3MF": edited(good, path, "</resources>", "").read_bytes(),
         "cannot be read as 3MF: ": edited(good, path, 'v3="1"', 'v3="77"').read_bytes(),
-        "finite": edited(good, path, 'x="1.000000"', 'x="1e39"').read_bytes(),
+        "Invalid Model Coordinates": edited(good, path, 'x="1.000000"', 'x="1e39"').read_bytes(),
     }
     for message, content in cases.items():
         path.write_bytes(content)

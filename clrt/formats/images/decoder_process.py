@@ -1,7 +1,7 @@
 """Decoder process that scene.decoder starts as `python -m clrt.formats.images.decoder_process`.
 
-It reads one request per line, [kind, file] in JSON. A reply is one line of JSON, {"error": ...} or {"arrays": {name:
-[shape, dtype]}, "facts": ...}, followed by the bytes of the arrays.
+It reads one request per line, [kind, file, options] in JSON. A reply is one line of JSON, {"error": ...} or {"arrays":
+{name: [shape, dtype]}, "facts": ...}, followed by the bytes of the arrays.
 """
 
 from __future__ import annotations
@@ -138,14 +138,14 @@ def draco(file: str) -> Found:
     }, {}
 
 
-KINDS: dict[str, Callable[[str], Found]] = {"picture": picture, "draco": draco}
+KINDS: dict[str, Callable[..., Found]] = {"picture": picture, "draco": draco}
 #: Modules whose function `decode` decodes further kinds of file.
 MODULES = {"3mf": "clrt.formats.threemf.package", "usd": "clrt.formats.usd.stage"}
 
 
-def _decoder(kind: str) -> Callable[[str], Found]:
+def _decoder(kind: str) -> Callable[..., Found]:
     """Return the function that decodes files of a kind."""
-    function: Callable[[str], Found] = KINDS.get(kind) or import_module(MODULES[kind]).decode
+    function: Callable[..., Found] = KINDS.get(kind) or import_module(MODULES[kind]).decode
     return function
 
 
@@ -164,11 +164,11 @@ def main() -> None:
             _answer(replies, *json.loads(line))
 
 
-def _answer(replies: Any, kind: str, file: str) -> None:
+def _answer(replies: Any, kind: str, file: str, options: dict[str, Any]) -> None:
     arrays: dict[str, NDArray[Any]] = {}
     facts: dict[str, Any] = {}
     try:
-        arrays, facts = _decoder(kind)(file)
+        arrays, facts = _decoder(kind)(file, **options)
         reply: dict[str, Any] = {"facts": facts}
     except MemoryError:
         reply = {"error": "it needs too much memory"}
