@@ -219,7 +219,7 @@ class Shapes:
         if opacity is not None and opacity[1] != "constant" and facts["kind"] == "Mesh":
             return None
         alpha = 1.0 if opacity is None else opacity[0][0, 0]
-        return np.nan_to_num(np.append(color[0][0, :3], alpha)).clip(0, 1)
+        return np.asarray(np.nan_to_num(np.append(color[0][0, :3], alpha)).clip(0, 1))
 
     def _note(self, what: str, count: int = 1) -> None:
         self.ignored[what] = self.ignored.get(what, 0) + count

@@ -33,15 +33,19 @@ RENDERED = ("default", "render")
 def decode(file: str, time: float | None = None) -> Found:
     """Read a file at a time in seconds; None for the first time with values.
 
-    Raises pxr's exceptions, and ValueError for too many prims.
+    Raises ValueError for a malformed file, and for too many prims; pxr may raise other exceptions.
     """
-    from pxr import Usd, UsdGeom
+    from pxr import Tf, Usd, UsdGeom
 
-    stage = Usd.Stage.Open(file)
+    try:
+        stage = Usd.Stage.Open(file)
+    except Tf.ErrorException as error:
+        raise ValueError(str(error.args[0].commentary)) from None
     start = stage.GetStartTimeCode() if stage.HasAuthoredTimeCodeRange() else None
     code = Usd.TimeCode.EarliestTime() if start is None else Usd.TimeCode(start)
     if time is not None:
         code = Usd.TimeCode((start or 0.0) + time * stage.GetTimeCodesPerSecond())
+    _bake_skins(stage, 0.0 if start is None and time is None else code.GetValue())
     content = _Content(code)
     content.add(stage.GetPseudoRoot())
     numbers, matrices = content.places()
@@ -58,6 +62,15 @@ def decode(file: str, time: float | None = None) -> Found:
         "cameras": content.cameras,
         "ignored": {what: count for what, count in content.ignored.items() if count},
     }
+
+
+def _bake_skins(stage: Any, time: float) -> None:
+    """Replace the points of skinned meshes by those that their skeletons make of them at a time code."""
+    from pxr import Gf, UsdSkel
+
+    if any(prim.IsA(UsdSkel.Root) for prim in stage.Traverse()):
+        stage.SetEditTarget(stage.GetSessionLayer())
+        UsdSkel.BakeSkinning(stage.Traverse(), Gf.Interval(time, time))
 
 
 class Visit(NamedTuple):

@@ -48,7 +48,7 @@ class Shapes:
         key = str(source.GetPath()), material
         if key not in self._numbers:
             number = self._numbers[key] = len(self.facts)
-            shape = {
+            shape: dict[str, Any] = {
                 "name": str(prim.GetName()),
                 "material": material,
                 "double_sided": bool(UsdGeom.Gprim(prim).GetDoubleSidedAttr().Get(self._code)),
