@@ -35,7 +35,21 @@ SECONDS = 30
 #: Files larger than this number of bytes are not used as seeds.
 LARGEST = 300_000
 PICTURES = (".hdr", ".exr", ".png", ".jpg")
-FORMATS = (".toml", ".glb", ".gltf", ".obj", ".mtl", ".ply", ".stl", ".off", ".3mf", *PICTURES)
+FORMATS = (
+    ".toml",
+    ".glb",
+    ".gltf",
+    ".obj",
+    ".mtl",
+    ".ply",
+    ".stl",
+    ".off",
+    ".3mf",
+    ".usda",
+    ".usdc",
+    ".usdz",
+    *PICTURES,
+)
 GOOD = ("picture", "error")
 NUMBERS = [
     "-1",

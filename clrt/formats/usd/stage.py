@@ -8,6 +8,7 @@ Facts: `meters` per unit, `up`, `layers`, files that were read; `shapes`, `mater
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -35,6 +36,7 @@ def decode(file: str, time: float | None = None) -> Found:
 
     Raises ValueError for a malformed file, and for too many prims; pxr may raise other exceptions.
     """
+    os.environ.setdefault("PXR_WORK_THREAD_LIMIT", "4")  # threads take memory, which is limited
     from pxr import Tf, Usd, UsdGeom
 
     try:
