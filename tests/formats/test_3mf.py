@@ -97,9 +97,8 @@ def test_color_groups_split_seams(tmp_path: Path) -> None:
     package.item(mesh)
     (read,) = read_model(package.write(tmp_path / "a.3mf")).meshes
     assert read.colors is not None and len(read.vertices) == 5
-    np.testing.assert_allclose(
-        read.colors[read.faces[3]], [[1, 0, 0, 1], [0.5029, 0.5029, 0.5029, 0], [1, 0, 0, 1]], atol=1e-4
-    )
+    expected = np.array([[1, 0, 0, 1], [0.5029, 0.5029, 0.5029, 0], [1, 0, 0, 1]])
+    np.testing.assert_allclose(read.colors[read.faces[3]], expected, atol=1e-4)
     np.testing.assert_array_equal(read.colors[read.faces[:3]].reshape(-1, 4), [[1, 0, 0, 1]] * 9)
 
 
@@ -124,7 +123,7 @@ def test_textures(tmp_path: Path) -> None:
     package.item(mesh)
     (read,) = read_model(package.write(tmp_path / "a.3mf")).meshes
     assert read.uv is not None and isinstance(read.material, Diffuse) and isinstance(read.material.color, Texture)
-    np.testing.assert_allclose(read.uv[read.faces[0]], [[0, 1], [1, 1], [0.25, 0.25]])
+    np.testing.assert_allclose(read.uv[read.faces[0]], np.array([[0, 1], [1, 1], [0.25, 0.25]]))
     np.testing.assert_array_equal(read.material.color.picture.texels, imageio.imread(tmp_path / "image.png"))
     assert read.material.color.wrap == ("clamp", "mirror") and read.material.opacity == 1
 

@@ -47,7 +47,7 @@ AREAS = {
 
 @pytest.mark.parametrize("kind", AREAS)
 def test_normalized_lights_keep_their_power(tmp_path: Path, kind: str) -> None:
-    """Radiance times area is the intensity, at any scale; flat lights emit along −Z."""
+    """Radiance times area, in the stage's unit, is the intensity, at any scale; flat lights emit along −Z."""
     content, expected = AREAS[kind]
     scaled = 'double3 xformOp:scale = (3, 3, 3)\nuniform token[] xformOpOrder = ["xformOp:scale"]\n'
     for transform, factor in (("", 1), (scaled, 9)):
@@ -57,6 +57,8 @@ def test_normalized_lights_keep_their_power(tmp_path: Path, kind: str) -> None:
         assert area(plain) == pytest.approx(expected * factor, rel=5e-3)
         np.testing.assert_allclose(radiance(plain), 5)
         np.testing.assert_allclose(radiance(even) * area(even), 5, rtol=1e-6)
+        (small,) = read_usd(usda(tmp_path, lit(kind, text + "\nbool inputs:normalize = 1"), meters=0.01)).emitters
+        np.testing.assert_allclose(radiance(small), radiance(even), rtol=1e-5)
         if kind != "SphereLight":
             np.testing.assert_allclose(facing(plain), [0, 0, -area(plain)], atol=1e-6)
 

@@ -9,6 +9,7 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from numpy.typing import NDArray
 
 from clrt.formats.usd.materials import DEFAULTS, _placed
 from clrt.formats.usd.reader import read_usd
@@ -34,8 +35,8 @@ def surface(folder: Path, inputs: str, nodes: str = "", content: str = ST) -> Me
     return read.material
 
 
-def linear(encoded: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+def linear(encoded: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4))
 
 
 def test_defaults_are_those_of_the_specification(tmp_path: Path) -> None:
@@ -185,7 +186,7 @@ def test_transform_nodes_are_followed(tmp_path: Path) -> None:
 """
     )
     color = surface(tmp_path, TEXTURED, nodes).color
-    assert isinstance(color, Texture) and color.scale == (2, 3)
+    assert isinstance(color, Texture) and list(color.scale) == [2, 3]
     np.testing.assert_allclose(color.to_picture @ [0, 1, 1], [0.25, 1 - 0.5])
 
 
@@ -194,7 +195,7 @@ def test_textures_that_are_missing(tmp_path: Path, caplog: pytest.LogCaptureFixt
     with caplog.at_level(logging.WARNING):
         made = surface(tmp_path, TEXTURED, texture("none.png", "float4 inputs:fallback = (0.5, 0.25, 0, 1)"))
         assert made.color == (0.5, 0.25, 0.0)
-        assert "a texture is left out: none.png: no such picture file" in caplog.text
+        assert "a texture is left out: none.png: no such image file" in caplog.text
         assert surface(tmp_path, TEXTURED, texture("ramp.png"), "").color == (1.0, 1.0, 1.0)
     assert "textures of meshes without their texture coordinates (1)" in caplog.text
 

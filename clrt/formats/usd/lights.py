@@ -53,6 +53,8 @@ def read_lights(path: Path, facts: list[dict[str, Any]], materials: Materials, u
             if (distant := _distant(light, color, matrix)) is not None:
                 found.lights.append(distant)
         else:
+            if light["normalize"]:  # areas are in the stage's unit
+                color = color * np.linalg.norm(upright[:3, 0]) ** 2
             _add_local(found, light, color, matrix, materials)
     return found
 
@@ -113,23 +115,23 @@ def _point(light: dict[str, Any], color: NDArray[np.float64], matrix: Matrix, sp
 
 def _shape(light: dict[str, Any], name: str) -> Mesh | None:
     """Return a light's surface in its own frame: rectangles and discs emit along −Z; None for one without a size."""
-    if light["type"] == "SphereLight":
-        vertices, faces, _ = solid("Sphere", {"radius": light["radius"]})
-    elif light["type"] == "CylinderLight":
-        vertices, faces, _ = solid("Cylinder", {"radius": light["radius"], "height": light["length"], "axis": "X"})
-    elif light["type"] == "RectLight":
+    if light["type"] in ("SphereLight", "CylinderLight"):
+        size = {"radius": light["radius"]}
+        size |= {"height": light["length"], "axis": "X"} if "length" in light else {}
+        made = solid(light["type"].removesuffix("Light"), size)
+        return None if made is None else Mesh(made[0], made[1], name=name)
+    if light["type"] == "RectLight":
         x, y = light["width"] / 2, light["height"] / 2
         vertices = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]], np.float32)
         faces = np.array([[0, 2, 1], [0, 3, 2]], np.int32)
         uv = np.array([[1, 1], [0, 1], [0, 0], [1, 0]], np.float32)
         return Mesh(vertices, faces, name=name, uv=uv) if x > 0 and y > 0 else None
-    else:
-        turns = np.arange(SEGMENTS) * 2 * pi / SEGMENTS
-        rim = light["radius"] * np.column_stack([np.cos(turns), np.sin(turns), np.zeros(SEGMENTS)])
-        vertices = np.concatenate([np.zeros((1, 3)), rim]).astype(np.float32)
-        first = np.arange(SEGMENTS)
-        faces = np.column_stack([np.zeros(SEGMENTS), 1 + (first + 1) % SEGMENTS, 1 + first]).astype(np.int32)
-    return Mesh(vertices, faces, name=name) if np.ptp(vertices, axis=0).max() > 0 else None
+    turns = np.arange(SEGMENTS) * 2 * pi / SEGMENTS
+    rim = light["radius"] * np.column_stack([np.cos(turns), np.sin(turns), np.zeros(SEGMENTS)])
+    vertices = np.concatenate([np.zeros((1, 3)), rim]).astype(np.float32)
+    first = np.arange(SEGMENTS)
+    faces = np.column_stack([np.zeros(SEGMENTS), 1 + (first + 1) % SEGMENTS, 1 + first]).astype(np.int32)
+    return Mesh(vertices, faces, name=name) if light["radius"] > 0 else None
 
 
 def _area(mesh: Mesh) -> float:

@@ -154,7 +154,7 @@ class Materials:
             return Path(facts["path"])
         found = find_file(self._path, [self._path.parent], facts["name"])
         if found is None:
-            raise SceneError(f"{printable(facts['name'])}: no such picture file")
+            raise SceneError(f"{printable(facts['name'])}: no such image file")
         return found
 
 

@@ -58,7 +58,9 @@ class Shapes:
         return self._made[number]
 
     def _solid(self, number: int, facts: dict[str, Any]) -> Iterator[Mesh]:
-        vertices, faces, normals = solid(facts["kind"], facts["size"])
+        if (made := solid(facts["kind"], facts["size"])) is None:
+            return
+        vertices, faces, normals = made
         look = self._look(facts["material"])
         colors = self._constant_color(number, facts) if look is None or look.vertex_colors else None
         material = self._material(look, facts, colors)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import SceneError
 from ...scene.geometry.creases import creased
 from ...scene.geometry.normals import smooth_normals
 from ...scene.model import Mesh
@@ -20,11 +21,19 @@ CREASE_DEGREES = 30.0
 AXES = {"X": [2, 0, 1], "Y": [1, 2, 0], "Z": [0, 1, 2]}
 
 
-def solid(kind: str, size: dict[str, Any]) -> tuple[Floats, NDArray[np.int32], Floats | None]:
-    """Return vertices (n, 3), faces (m, 3) and normals (n, 3), None for flat shading. size: the shape's attributes."""
+def solid(kind: str, size: dict[str, Any]) -> tuple[Floats, NDArray[np.int32], Floats | None] | None:
+    """Return vertices (n, 3), faces (m, 3) and normals (n, 3), None for flat shading; None for a shape without a size.
+
+    size: the shape's attributes. Raises SceneError for those that are not finite.
+    """
     from trimesh import creation  # most files have none of these shapes
 
     length = {name: abs(float(value)) for name, value in size.items() if name != "axis"}
+    for name, value in length.items():
+        if not value < float(np.finfo(np.float32).max):
+            raise SceneError(f"the {name} of a {kind} is {value:g}; write a smaller number")
+    if 0 in length.values():
+        return None
     if kind == "Cube":
         made = creation.box([length["size"]] * 3)
     elif kind == "Plane":
