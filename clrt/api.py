@@ -40,7 +40,7 @@ def load(
     ignore_extensions: Iterable[str] = (),
     approximate: bool = False,
 ) -> Scene:
-    """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (.glb .gltf .obj .ply .stl .off).
+    """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (glTF, USD, OBJ, PLY, STL, OFF or 3MF).
 
     camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left". For a
     bare model also up: which of its axes points up, "x", "y" or "z"; unit: that of its coordinates, "m", "cm", "mm",

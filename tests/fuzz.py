@@ -11,6 +11,7 @@ resumes after the file that caused it.
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import os
 import random
@@ -22,6 +23,7 @@ import sys
 import tempfile
 import traceback
 import warnings
+import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -33,7 +35,23 @@ SECONDS = 30
 #: Files larger than this number of bytes are not used as seeds.
 LARGEST = 300_000
 PICTURES = (".hdr", ".exr", ".png", ".jpg")
-FORMATS = (".toml", ".glb", ".gltf", ".obj", ".mtl", ".ply", ".stl", ".off", ".xml", ".serialized", *PICTURES)
+FORMATS = (
+    ".toml",
+    ".glb",
+    ".gltf",
+    ".obj",
+    ".mtl",
+    ".ply",
+    ".stl",
+    ".off",
+    ".3mf",
+    ".usda",
+    ".usdc",
+    ".usdz",
+    ".xml",
+    ".serialized",
+    *PICTURES,
+)
 GOOD = ("picture", "error")
 NUMBERS = [
     "-1",
@@ -122,8 +140,9 @@ def case(seeds: list[Path], number: int) -> tuple[Path, bytes]:
                 (_numbers, _numbers, _cut, _repeated, _overwritten, _overwritten, _flipped, _truncated, _lines)
             )
         )
-        inside = content.startswith(b"glTF") and (document or rng.random() < 0.7)
-        content = _in_chunk(content, change, rng) if inside else change(content, rng)
+        inside = content.startswith((b"glTF", b"PK")) and (document or rng.random() < 0.7)
+        within = _in_chunk if content.startswith(b"glTF") else _in_archive
+        content = within(content, change, rng) if inside else change(content, rng)
     return seed, content
 
 
@@ -142,6 +161,20 @@ def _in_chunk(content: bytes, change: Change, rng: random.Random) -> bytes:
         + struct.pack("<I4s", len(rest), b"BIN\0")
         + rest
     )
+
+
+def _in_archive(content: bytes, change: Change, rng: random.Random) -> bytes:
+    """Change one of the files in a ZIP archive, which are stored without compression."""
+    copy = io.BytesIO()
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as given, zipfile.ZipFile(copy, "w") as changed:
+            damaged = rng.choice(given.namelist())
+            for name in given.namelist():
+                file = given.read(name)
+                changed.writestr(zipfile.ZipInfo(name), change(file, rng) if name == damaged else file)
+    except Exception:  # an archive that an earlier change has damaged
+        return content
+    return copy.getvalue()
 
 
 def _place(content: bytes, rng: random.Random) -> int:

@@ -28,6 +28,8 @@ from .formats.test_meshopt import compress
 from .formats.test_mitsuba_serialized import TRIANGLE, serialized, stream
 from .formats.test_ply import XYZ, Element, written
 from .formats.test_stl import binary
+from .formats.threemf_files import painted
+from .formats.usd_files import BOUND, ST, TEXTURED, material, mesh, texture, usda, usdz
 from .fuzz import FORMATS, LARGEST, OBJ
 from .scene.shapes import icosphere
 
@@ -184,12 +186,27 @@ def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
         "textured.glb": textured((folder / "wood.jpg").read_bytes()),
     }.items():
         document.write(folder / name)
+    painted().write(folder / "a.3mf")
+    write_stages(folder)
     for place in more:
         for file in sorted(place.rglob("*")):
             if file.suffix == ".bin":  # under the name that its model refers to
                 shutil.copyfile(file, folder / file.name)
             elif file.is_file() and file.suffix.lower() in FORMATS and file.stat().st_size <= LARGEST:
                 shutil.copyfile(file, folder / f"{place.name}-{file.name.lower()}")
+
+
+def write_stages(folder: Path) -> None:
+    """Write USD files of a textured square, a light and a camera."""
+    from pxr import Sdf
+
+    prims = (
+        mesh(ST + BOUND) + material(TEXTURED, texture("wood.png")) + 'def SphereLight "lamp" {}\ndef Camera "view" {}'
+    )
+    text = usda(folder, prims)
+    Sdf.Layer.FindOrOpen(str(text)).Export(str(folder / "a.usdc"))
+    files = {"a.usdc": (folder / "a.usdc").read_bytes(), "wood.png": (folder / "wood.png").read_bytes()}
+    usdz(folder / "a.usdz", files)
 
 
 def textured(picture: bytes) -> Gltf:

@@ -95,10 +95,10 @@ def _load_model(
     choice, moving: see `load`.
     """
     model = read_model(path, choice=choice)
-    placing = {"up": up or model.up, "unit": unit or "m"}
+    placing = {"up": up or model.up, "unit": unit or model.unit}
     placing = {key: value for key, value in placing.items() if value != getattr(MeshTable, key)}
     if placing:
-        model = placed_animation(model, upright(up or model.up, unit or "m"))
+        model = placed_animation(model, upright(up or model.up, unit or model.unit))
     if model.converted_from is not None:
         log.warning(
             "%s: %s; --light-unit radiometric takes them as W/sr and W/m²", path, CONVERTED[model.converted_from]
@@ -108,12 +108,12 @@ def _load_model(
     camera = next(iter(model.cameras.values()), None) if angle is None else None
     sun = transform_light(SUN, turn) if angle else SUN
     return Scene(
-        meshes=model.meshes,
+        meshes=model.meshes + model.emitters,
         instances=model.instances,
         camera=camera or frame(*_framed(model, moving or choice.animation is not None), turn),
         cameras=model.cameras,
-        environment=default_sky(),
-        lights=model.lights or [sun],
+        environment=model.environment or default_sky(),
+        lights=model.lights if model.lights or model.emitters or model.environment else [sun],
         name=name_of(path),
         animation=model.animation,
         source=source_of_model(path, model, placing, whole=replace(choice, light_unit=None) == DEFAULT),

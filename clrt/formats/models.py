@@ -20,7 +20,7 @@ from ..file_names import StrPath
 from ..scene.geometry.instancing import baked
 from ..scene.geometry.normals import Normals, choose_normals
 from ..scene.materials.material_types import Diffuse
-from ..scene.model import Mesh, Model
+from ..scene.model import Instance, Mesh, Model
 from ..scene.validation.validate import mesh_problems
 from .images.image_reader import linear_from_srgb
 from .model_choice import DEFAULT, ModelChoice
@@ -38,8 +38,8 @@ def read_mesh(path: StrPath, normals: Normals = "file") -> list[Mesh]:
 def read_model(path: StrPath, normals: Normals = "file", choice: ModelChoice = DEFAULT) -> Model:
     """Read a model file: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
 
-    Polygons are triangulated. `normals`: see `choose_normals`; choice: for glTF files. Raises SceneError naming the
-    file, the mesh, and the index or vertex that is wrong.
+    Polygons are triangulated. `normals`: see `choose_normals`; choice: for glTF and USD files. Raises SceneError naming
+    the file, the mesh, and the index or vertex that is wrong.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -58,6 +58,12 @@ def _gltf(path: Path, normals: Normals, choice: ModelChoice) -> Model:
     from .gltf.reader import read_gltf
 
     return read_gltf(path, normals, choice)
+
+
+def _usd(path: Path, normals: Normals, choice: ModelChoice) -> Model:
+    from .usd.reader import read_usd
+
+    return read_usd(path, normals, choice)
 
 
 def _obj(path: Path) -> dict[str, Any]:
@@ -84,22 +90,33 @@ def _off(path: Path) -> dict[str, Any]:
     return parse_off(path)
 
 
+def _3mf(path: Path) -> dict[str, Any]:
+    from .threemf.reader import parse_3mf
+
+    return parse_3mf(path)
+
+
 def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals], Model]:
     """Return a reader from a parser, which returns the keyword arguments of trimesh's classes for one mesh (vertices,
-    faces, vertex_normals, uv, vertex_colors), or for several by name in `geometry`, and which axis is `up` unless it is
-    y; it raises SceneError for a malformed file."""
+    faces, vertex_normals, uv, vertex_colors), or for several by name in `geometry`.
+
+    It also returns which axis is `up` unless it is y, the `unit` unless it is m, and `places`, pairs of a mesh's name
+    and a matrix (4, 4), unless each is placed once as it is. It raises SceneError for a malformed file.
+    """
 
     def read(path: Path, normals: Normals) -> Model:
         try:
             with np.errstate(all="ignore"):  # values that are not finite are reported
                 parts = parse(path)
-                return Model(meshes=_meshes(path, parts, normals), up=parts.get("up", "y"))
+                meshes, instances = _placed(_meshes(path, parts, normals), parts.get("places"))
+                return Model(meshes=meshes, instances=instances, up=parts.get("up", "y"), unit=parts.get("unit", "m"))
         except SceneError as error:
             raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
     return read
 
 
+USD = (".usd", ".usda", ".usdc", ".usdz")
 #: Readers of model files by suffix, which raise SceneError naming the file.
 FORMATS: dict[str, Callable[..., Model]] = {
     ".glb": _gltf,
@@ -108,10 +125,12 @@ FORMATS: dict[str, Callable[..., Model]] = {
     ".ply": of_parts(_ply),
     ".stl": of_parts(_stl),
     ".off": of_parts(_off),
+    ".3mf": of_parts(_3mf),
+    **dict.fromkeys(USD, _usd),
 }
 SUFFIXES = tuple(FORMATS)
 #: Formats whose readers' last argument is a ModelChoice.
-CHOOSING = {".glb", ".gltf"}
+CHOOSING = {".glb", ".gltf", *USD}
 
 
 def _meshes(path: Path, parts: dict[str, Any], normals: Normals) -> list[Mesh]:
@@ -129,6 +148,18 @@ def _meshes(path: Path, parts: dict[str, Any], normals: Normals) -> list[Mesh]:
     if problems:
         raise SceneError(problems)
     return meshes
+
+
+def _placed(
+    meshes: list[Mesh], places: list[tuple[str, NDArray[np.float64]]] | None
+) -> tuple[list[Mesh], list[Instance]]:
+    """Return the meshes in world coordinates, or as instances where these save memory."""
+    if places is None:
+        return meshes, []
+    from .gltf.instancing import shown  # most formats have no places
+
+    by_name = {mesh.name: mesh for mesh in meshes}
+    return shown((by_name[name], matrix) for name, matrix in places if name in by_name)
 
 
 def _mesh(path: Path, name: str, piece: dict[str, Any], normals: Normals) -> Mesh:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import ClrtError
 from .animation import Animation, ModelAnimation
-from .axes_and_units import Axis, LightUnit
+from .axes_and_units import Axis, LightUnit, Unit
 from .cameras import Camera as Camera
 from .fields.limits import Gt
 from .fields.number_arrays import real_array, whole_array
@@ -89,10 +89,12 @@ class Instance:
 class Model:
     """Content of a model file: meshes or instances, at least one, cameras by name in file order, and lights.
 
+    - emitters: lights with a surface, which are not part of the model itself
+    - environment: the light from all around, if the file has one
     - animation: the file's first one, or the one that was chosen
     - contents: names of all that can be chosen, by kind: scenes, animations, variants; supported extensions that are
       used; left_out: what is not rendered, and why
-    - up: which of the file's axes points up
+    - up, unit: which of the file's axes points up, and the unit of its lengths
     - converted_from: the unit of the lights in the file, if it was guessed and they were converted
     """
 
@@ -100,9 +102,12 @@ class Model:
     instances: list[Instance] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
     lights: list[Light] = field(default_factory=list)
+    emitters: list[Mesh] = field(default_factory=list)
+    environment: Environment | None = None
     animation: ModelAnimation | None = None
     contents: Mapping[str, Sequence[str]] = field(default_factory=dict)
     up: Axis = "y"
+    unit: Unit = "m"
     converted_from: LightUnit | None = None
 
 

@@ -1,5 +1,5 @@
-"""Decoding of images and compressed meshes in a child process, since the libraries may crash, hang or exhaust memory if
-a file is damaged.
+"""Decoding of images, compressed meshes, 3MF and USD files in a child process, since the libraries may crash, hang or
+exhaust memory if a file is damaged.
 
 The process starts with the first file, is reused for later ones, and exits after being idle for a while.
 """
@@ -32,34 +32,35 @@ _lock = threading.Lock()
 _running: _Process | None = None
 
 
-def decode(kind: str, source: Path | bytes, suffix: str = "") -> tuple[Arrays, dict[str, Any]]:
+def decode(kind: str, source: Path | bytes, suffix: str = "", **options: Any) -> tuple[Arrays, dict[str, Any]]:
     """Decode a file, or bytes of a file with the name suffix `suffix`, and return its arrays and other facts.
 
-    kind: a function of scene.decoding. Raises SceneError with its message, or with how the process ended.
+    kind: one of decoder_process.KINDS or MODULES, whose function also gets the options. Raises SceneError with its
+    message, or with how the process ended.
     """
     try:
         if isinstance(source, Path):
             with utf8_path(source.absolute()) as path:
-                return _decoded(kind, path)
+                return _decoded([kind, str(path), options])
         with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
             file = Path(folder) / f"embedded{suffix}"
             file.write_bytes(source)
-            return decode(kind, file)
+            return decode(kind, file, **options)
     except OSError as error:
         raise SceneError(
             f"the system cannot provide a process or a temporary file for the decoder ({error.strerror or error})"
         ) from error
 
 
-def _decoded(kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
+def _decoded(request: list[Any]) -> tuple[Arrays, dict[str, Any]]:
     global _running
     with _lock:
         if _running is not None and _running.owner == os.getpid():
             with suppress(_Ended):  # it may merely have exited after being idle
-                return _running.decode(kind, file)
+                return _running.decode(request)
         _running = _Process()
         try:
-            return _running.decode(kind, file)
+            return _running.decode(request)
         except _Ended as end:
             _running = None
             raise SceneError(f"the decoder {end}; the file is damaged or too large") from None
@@ -87,8 +88,11 @@ class _Process:
         assert self._popen.stdin and self._popen.stdout
         self._requests, self._replies = self._popen.stdin, self._popen.stdout
 
-    def decode(self, kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
-        """Decode a file, see `decode` of the module. Raises _Ended if the process ends or has to be killed."""
+    def decode(self, request: list[Any]) -> tuple[Arrays, dict[str, Any]]:
+        """Decode a file, [kind, file, options], see `decode` of the module.
+
+        Raises _Ended if the process ends or has to be killed.
+        """
         ended, late = Event(), Event()
 
         def watch() -> None:
@@ -98,7 +102,7 @@ class _Process:
 
         beside(watch, daemon=True)
         try:
-            self._requests.write(json.dumps([kind, str(file)]).encode() + b"\n")
+            self._requests.write(json.dumps(request).encode() + b"\n")
             self._requests.flush()
             reply = json.loads(self._replies.readline() or "null")
             if reply is None:

@@ -1,7 +1,7 @@
 """Decoder process that scene.decoder starts as `python -m clrt.formats.images.decoder_process`.
 
-It reads one request per line, [kind, file] in JSON. A reply is one line of JSON, {"error": ...} or {"arrays": {name:
-[shape, dtype]}, "facts": ...}, followed by the bytes of the arrays.
+It reads one request per line, [kind, file, options] in JSON. A reply is one line of JSON, {"error": ...} or {"arrays":
+{name: [shape, dtype]}, "facts": ...}, followed by the bytes of the arrays.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
+from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,9 @@ MOST_BYTES = 2**31
 #: size; deflate reaches 1032.
 FREE_BYTES = 2**28
 MOST_RATIO = 2000
+#: Memory for a file that a decoder of MODULES reads: FREE_MEMORY, and MEMORY_RATIO times the file's size.
+FREE_MEMORY = 2**31
+MEMORY_RATIO = 100
 #: Idle seconds after which the process exits.
 IDLE = 2.0
 #: Parts of an image that are looked at.
@@ -162,7 +167,15 @@ def basis(file: str) -> Found:
     return {"pixels": image.transcode("rgba8").data}, {"channels": "RGBA"}
 
 
-KINDS: dict[str, Callable[[str], Found]] = {"picture": picture, "draco": draco, "avif": avif, "basis": basis}
+KINDS: dict[str, Callable[..., Found]] = {"picture": picture, "draco": draco, "avif": avif, "basis": basis}
+#: Modules whose function `decode` decodes further kinds of file.
+MODULES = {"3mf": "clrt.formats.threemf.package", "usd": "clrt.formats.usd.stage"}
+
+
+def _decoder(kind: str) -> Callable[..., Found]:
+    """Return the function that decodes files of a kind."""
+    function: Callable[..., Found] = KINDS.get(kind) or import_module(MODULES[kind]).decode
+    return function
 
 
 def main() -> None:
@@ -180,11 +193,12 @@ def main() -> None:
             _answer(replies, *json.loads(line))
 
 
-def _answer(replies: Any, kind: str, file: str) -> None:
+def _answer(replies: Any, kind: str, file: str, options: dict[str, Any]) -> None:
     arrays: dict[str, NDArray[Any]] = {}
     facts: dict[str, Any] = {}
     try:
-        arrays, facts = KINDS[kind](file)
+        with _memory_for(file) if kind in MODULES else nullcontext():
+            arrays, facts = _decoder(kind)(file, **options)
         reply: dict[str, Any] = {"facts": facts}
     except MemoryError:
         reply = {"error": "it needs too much memory"}
@@ -198,6 +212,26 @@ def _answer(replies: Any, kind: str, file: str) -> None:
     for array in arrays.values():
         replies.write(array.reshape(-1).view(np.uint8).data)
     replies.flush()
+
+
+@contextmanager
+def _memory_for(file: str) -> Iterator[None]:
+    """Limit further memory in proportion to a file, where the system says how much there is in use."""
+    try:
+        used = int(Path("/proc/self/statm").read_text().split()[5]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        yield
+        return
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    most = used + FREE_MEMORY + MEMORY_RATIO * os.path.getsize(file)
+    with suppress(ValueError):
+        resource.setrlimit(resource.RLIMIT_DATA, (most, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
 def _limit() -> None:

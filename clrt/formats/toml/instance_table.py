@@ -121,7 +121,10 @@ def placed(model: Model, matrix: Matrix, material: Material | None, others: dict
     ]
     cameras = {name: transform_camera(camera, matrix) for name, camera in model.cameras.items()}
     lights = [transform_light(light, matrix) for light in model.lights]
-    return replace(model, meshes=meshes, instances=instances, cameras=cameras, lights=lights, animation=None)
+    emitters = [transform_mesh(mesh, matrix) for mesh in model.emitters]
+    return replace(
+        model, meshes=meshes, instances=instances, cameras=cameras, lights=lights, emitters=emitters, animation=None
+    )
 
 
 def moved(instance: Instance, matrix: Matrix) -> Instance:

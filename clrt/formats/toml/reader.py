@@ -72,7 +72,7 @@ class SceneReader:
         ]
         models = [self._mesh(values, f"mesh[{i}]") for i, values in enumerate(self._tables("mesh"))]
         lights += [light for model in models for light in model.lights]
-        meshes = [mesh for model in models for mesh in model.meshes]
+        meshes = [mesh for model in models for mesh in [*model.meshes, *model.emitters]]
         instances = [instance for model in models for instance in model.instances]
         instances += [
             one for i, values in enumerate(self._tables("instance")) for one in self._instance(values, f"instance[{i}]")
@@ -249,7 +249,8 @@ class SceneReader:
             self._source.cameras.setdefault(name, self._cameras.setdefault(name, camera))
         self._instances.add(str(values["name"]) if "name" in values else None, model)
         shown = model if table is None or table.visible else Model(meshes=[])
-        return replace(shown, lights=model.lights if table and table.lights else [])
+        lit = table is not None and table.lights
+        return replace(shown, lights=model.lights if lit else [], emitters=model.emitters if lit else [])
 
     def _located(self, values: Table) -> Table:
         """Return the table of a mesh with an absolute path."""

@@ -1,0 +1,1 @@
+"""3MF, read by lib3mf."""

@@ -1,0 +1,1 @@
+"""USD, read by usd-core."""

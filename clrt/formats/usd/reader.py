@@ -1,0 +1,111 @@
+"""Reader for USD (.usd, .usda, .usdc, .usdz): the stage's meshes and instances, materials, lights and cameras.
+
+What cannot be rendered is listed in one logged warning.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...file_names import printable
+from ...scene.geometry.instancing import meshes_by_id
+from ...scene.geometry.normals import Normals
+from ...scene.geometry.transform import Matrix, scaling
+from ...scene.model import Mesh, Model
+from ...scene.validation.validate import mesh_problems
+from ..archives import check_archive
+from ..frame_model import bounds
+from ..gltf.instancing import shown
+from ..images.decoder import decode
+from ..model_choice import DEFAULT, ModelChoice, chosen
+from ..referenced_files import note_read
+from ..up_axis import upright
+from .cameras import read_cameras
+from .lights import read_lights
+from .materials import Materials
+from .meshes import Shapes
+
+log = logging.getLogger(__name__)
+
+
+def read_usd(path: Path, normals: Normals = "file", choice: ModelChoice = DEFAULT) -> Model:
+    """Read the stage of a USD file, in meters and with +Y up, at the time of `choice`, or the first one.
+
+    Raises SceneError naming the file and the prim that is wrong.
+    """
+    try:
+        with np.errstate(all="ignore"):  # values that are not finite are reported
+            return _model(path, normals, choice)
+    except SceneError as error:
+        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+
+
+def _model(path: Path, normals: Normals, choice: ModelChoice) -> Model:
+    arrays, facts = _content(path, choice)
+    for layer in facts["layers"]:
+        note_read(Path(layer))
+    materials = Materials(path, arrays, facts)
+    shapes = Shapes(path, arrays, facts, materials, normals)
+    to_scene = _to_scene(facts)
+    meshes, instances = shown(_places(arrays, shapes, to_scene))
+    if not meshes and not instances:
+        raise SceneError("its stage contains no triangles that are visible; export a model with meshes")
+    problems = [
+        problem for mesh in (*meshes, *meshes_by_id(instances).values()) for problem in mesh_problems(mesh, "mesh")
+    ]
+    if problems:
+        raise SceneError(problems)
+    cameras, no_cameras = read_cameras(facts["cameras"], to_scene, np.stack(bounds(meshes, instances)).mean(axis=0))
+    lights = read_lights(path, facts["lights"], materials, to_scene)
+    counted = facts["ignored"] | shapes.ignored
+    ignored = [f"{printable(what)} ({count})" for what, count in counted.items()]
+    if ignored := [*ignored, *materials.ignored, *lights.ignored, *no_cameras]:
+        log.warning("%s: ignored: %s", path, ", ".join(ignored))
+    return Model(
+        meshes=meshes,
+        instances=instances,
+        cameras=cameras,
+        lights=lights.lights,
+        emitters=lights.emitters,
+        environment=lights.environment,
+    )
+
+
+def _content(path: Path, choice: ModelChoice) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Return what the decoder process reads. Raises SceneError for a choice that USD files do not have."""
+    for what in ("scene", "variant", "animation"):
+        if (wanted := getattr(choice, what)) is not None:
+            chosen(wanted, [], what)
+    if choice.light_unit is not None:
+        raise SceneError("light_unit: is for glTF files; leave light_unit out")
+    if find_spec("pxr") is None:
+        raise SceneError("is read by usd-core, which is not installed; pip install usd-core, or export another format")
+    if path.suffix.lower() == ".usdz":
+        check_archive(path, compressed=False)
+    try:
+        return decode("usd", path, time=choice.time)
+    except SceneError as error:
+        message = " ".join(printable(str(error)).split())
+        raise SceneError(f"cannot be read as USD: {message}; export it again") from None
+
+
+def _to_scene(facts: dict[str, Any]) -> Matrix:
+    """Return the matrix from the stage's axes and unit to +Y up and meters."""
+    meters = float(facts["meters"])
+    if not (np.isfinite(meters) and meters > 0):
+        raise SceneError(f"metersPerUnit is {meters:g}; write a positive number")
+    return upright("z" if facts["up"] == "Z" else "y") @ scaling((meters, meters, meters))
+
+
+def _places(arrays: dict[str, NDArray[Any]], shapes: Shapes, to_scene: Matrix) -> Iterator[tuple[Mesh, Matrix]]:
+    for number, matrix in zip(arrays["numbers"].tolist(), to_scene @ arrays["matrices"]):
+        for mesh in shapes.meshes(number):
+            yield mesh, matrix
