@@ -31,22 +31,18 @@ static inline BsdfSample dispersed(const struct dielectric *m, real3 wo, real lo
     f.x = fresnel_dielectric(wo.z, d->etas.x, &cos_t.x);
     f.y = fresnel_dielectric(wo.z, d->etas.y, &cos_t.y);
     f.z = fresnel_dielectric(wo.z, d->etas.z, &cos_t.z);
-    real mean = (f.x + f.y + f.z) * (1.0f / 3.0f), rest = 3.0f * (1.0f - mean);
+    real mean = (f.x + f.y + f.z) * (1.0f / 3.0f);
     ireal reflected = lobe < mean;
-    real place = (lobe - mean) * 3.0f;     // from 0 to rest
+    real place = (lobe - mean) * 3.0f;     // below the sum of 1 − F
     ireal channel = place < 1.0f - f.x ? (ireal)(0) : (place < 2.0f - f.x - f.y ? (ireal)(1) : (ireal)(2));
-    channel = (channel == 2 & !(f.z < 1.0f)) ? (f.y < 1.0f ? (ireal)(1) : (ireal)(0)) : channel;      // by rounding
+    channel = ((channel == 2) & !(f.z < 1.0f)) ? (f.y < 1.0f ? (ireal)(1) : (ireal)(0)) : channel;      // by rounding
     real to_inside = 1.0f / of_channel(d->etas, channel);
     real3 bent = vector(-wo.x * to_inside, -wo.y * to_inside, -of_channel(cos_t, channel));
     real3 one = vector(channel == 0 ? ONE : ZERO, channel == 1 ? ONE : ZERO, channel == 2 ? ONE : ZERO);
+    real3 weight = choose(reflected, scale(f, 1.0f / mean), scale(mul(one, m->color), (real)(3.0f)));
     BsdfSample own = sample;
-    own.wi = choose(reflected, vector(-wo.x, -wo.y, wo.z), bent);
-    own.weight = choose(reflected, scale(f, 1.0f / mean), scale(mul(one, m->color), (real)(3.0f)));
-    own.pdf = (reflected | (rest > 0.0f)) ? ONE : ZERO;
-    own.spread = reflected ? ONE : to_inside * to_inside;
-    sample.wi = choose(separate, own.wi, sample.wi);
-    sample.weight = choose(separate, own.weight, sample.weight);
-    sample.pdf = separate ? own.pdf : sample.pdf;
-    sample.spread = separate ? own.spread : sample.spread;
-    return sample;
+    own.wi = choose(separate, choose(reflected, vector(-wo.x, -wo.y, wo.z), bent), sample.wi);
+    own.weight = choose(separate, weight, sample.weight);
+    own.spread = separate ? (reflected ? ONE : to_inside * to_inside) : sample.spread;
+    return own;
 }

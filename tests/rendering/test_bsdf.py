@@ -21,15 +21,18 @@ pytestmark = pytest.mark.statistics
 
 SAMPLES = 1 << 15
 #: Features of materials with another formula.
-OTHERWISE = {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"}
+OTHERWISE = {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR", "ANISOTROPY", "IRIDESCENCE"}
 #: Kernel text and replacements that make it slightly wrong: densities, sampled directions, and a value.
 WRONG = {
     "density of the microfacets": (
-        "facets / (1.0f + ggx_lambda(wo, m->alpha))",
-        "facets / (1.05f + ggx_lambda(wo, m->alpha))",
+        "facets / (1.0f + ggx_lambda(STRETCHED(m, wo), m->alpha))",
+        "facets / (1.05f + ggx_lambda(STRETCHED(m, wo), m->alpha))",
     ),
     "density of the cosine": ("shares.diffuse * cosine_pdf(wi.z)", "shares.diffuse * (0.5f / PI)"),
-    "density of further bounces": ("cos_theta * cos_theta + m->alpha", "cos_theta * cos_theta + 1.5f * m->alpha"),
+    "density of further bounces": (
+        "cos_theta * cos_theta + WIDEST_ALPHA",
+        "cos_theta * cos_theta + 1.5f * WIDEST_ALPHA",
+    ),
     "shares of the lobes": ("choose(lobe < share.specular,", "choose(lobe < 0.9f * share.specular,"),
     "visible normals": ("1.0f - u.y * (1.0f + stretched.z)", "1.0f - u.y * (1.0f + 0.9f * stretched.z)"),
 }
