@@ -15,9 +15,11 @@ from hypothesis import given, strategies as st
 
 from clrt.file_names import SHOWN, printable, utf8_path
 from clrt.formats.load_scene import load
-from clrt.formats.models import SUFFIXES
+from clrt.formats.models import SUFFIXES, USD
 from clrt.output.images import EXTENSIONS, metadata_of, read_image, write_image
 
+from ..formats.threemf_files import painted
+from ..formats.usd_files import mesh, usda, usdz
 from .test_commands import SCENE
 
 NAME = os.fsdecode(b"sc\xe8ne")
@@ -120,7 +122,22 @@ def test_pictures(folder: Path, suffix: str) -> None:
         assert str(other).isascii() and other.read_bytes() == path.read_bytes()
 
 
-@pytest.mark.parametrize("suffix", sorted(set(SUFFIXES) - {".gltf"}))
+@pytest.mark.needs("lib3mf", "pxr")
+def test_models_that_libraries_read(tmp_path: Path, folder: Path) -> None:
+    """Their readers need a path in UTF-8, and USD's the suffix, too."""
+    sdf = pytest.importorskip("pxr.Sdf")
+    painted().write(tmp_path / "a.3mf")
+    text = usda(tmp_path, mesh())
+    sdf.Layer.FindOrOpen(str(text)).Export(str(tmp_path / "a.usdc"))
+    usdz(tmp_path / "a.usdz", {"a.usda": text.read_bytes()})
+    text.with_suffix(".usd").write_bytes(text.read_bytes())
+    for suffix in (".3mf", *USD):
+        (tmp_path / f"a{suffix}").rename(folder / f"{NAME}{suffix}")
+    for suffix in (".3mf", *USD):
+        assert load(folder / f"{NAME}{suffix}").name == "sc\\xe8ne"
+
+
+@pytest.mark.parametrize("suffix", sorted(set(SUFFIXES) - {".gltf", ".3mf", *USD}))
 def test_models(folder: Path, suffix: str) -> None:
     import trimesh
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import locale
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -64,7 +65,9 @@ class Package:
         return self.model.AddTexture2DGroup(texture)
 
     def write(self, path: Path) -> Path:
+        before = locale.setlocale(locale.LC_ALL)  # lib3mf sets that of C
         self.model.QueryWriter("3mf").WriteToFile(str(path))
+        locale.setlocale(locale.LC_ALL, before)
         return path
 
 

@@ -6,7 +6,9 @@ What cannot be rendered is listed in one logged warning.
 from __future__ import annotations
 
 import logging
+import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -91,10 +93,23 @@ def _content(path: Path, choice: ModelChoice) -> tuple[dict[str, NDArray[Any]], 
     if path.suffix.lower() == ".usdz":
         check_archive(path, compressed=False)
     try:
-        return decode("usd", path, time=choice.time)
+        with _suffixed(path) as readable:
+            return decode("usd", readable, time=choice.time)
     except SceneError as error:
         message = " ".join(printable(str(error)).split())
         raise SceneError(f"cannot be read as USD: {message}; export it again") from None
+
+
+@contextmanager
+def _suffixed(path: Path) -> Iterator[Path]:
+    """Provide a UTF-8 path with the same suffix, which says what the format is; for a name that is not UTF-8 a link."""
+    if printable(str(path)) == str(path):
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
+        link = Path(folder) / f"stage{path.suffix.lower()}"
+        link.symlink_to(path.absolute())
+        yield link
 
 
 def _to_scene(facts: dict[str, Any]) -> Matrix:
