@@ -1,4 +1,4 @@
-"""`clrt convert`: a model to a scene file as a starting point."""
+"""`clrt convert`: a model or a Mitsuba scene to a scene file as a starting point."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ from .option_groups import grouped
 @grouped("loading", LoadOptions)
 @click.option("--force", is_flag=True, help="Replace existing files, including read-only ones.")
 def command(model: Path, scene: Path, loading: LoadOptions, force: bool) -> None:
-    """Write SCENE.toml, which renders like `clrt render MODEL`, with its camera, sky, lights and materials to edit."""
+    """Write SCENE.toml, which renders like `clrt render MODEL`, with its camera, sky, lights and materials to edit.
+
+    MODEL is a model, or a Mitsuba scene (.xml).
+    """
     from ..formats.toml.writer import started
     from ..output.atomic_files import check_target
     from ..output.scenes import save_scene

@@ -153,23 +153,16 @@ class SpotLight(BaseLight):
     falloff: Literal["cosine", "angle"] = "cosine"
     range: Length | None = None
 
-    @classmethod
-    def kernels(cls) -> tuple[str, ...]:
-        return "spot", "beam"
-
-    @property
-    def sampled_by(self) -> str:
-        return "beam" if self.falloff == "angle" else "spot"
-
     def parameters(self) -> dict[str, float | Vector]:
-        scale = radians if self.falloff == "angle" else one_minus_cos
+        """The slope of a falloff by angle is negative."""
+        scale, sign = (radians, -1) if self.falloff == "angle" else (one_minus_cos, 1)
         inner, outer = scale(self.inner_degrees), scale(self.outer_degrees)
         return {
             "position": self.position,
             "axis": unit_vector(self.direction),
             "intensity": self.intensity,
             "outer": outer,
-            "slope": 1 / max(outer - inner, STEEPEST),
+            "slope": sign / max(outer - inner, STEEPEST),
             "per_range2": _per_range2(self.range),
         }
 
@@ -179,7 +172,8 @@ class SpotLight(BaseLight):
         )
 
     def features(self) -> frozenset[str]:
-        return frozenset({"LIGHT_CONES", "LIGHT_RANGES"} if self.range else {"LIGHT_CONES"})
+        has = {"LIGHT_CONES": True, "LIGHT_RANGES": self.range, "ANGULAR_SPOTS": self.falloff == "angle"}
+        return frozenset(name for name, present in has.items() if present)
 
     def conflicts(self) -> list[str]:
         fault = (

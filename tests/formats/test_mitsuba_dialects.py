@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from clrt.cli.convert import command as convert
 from clrt.cli.info import command as info
 from clrt.errors import SceneError, UsageError
 from clrt.formats.images.image_reader import linear_from_srgb, read_picture
@@ -252,6 +253,18 @@ def test_approximate_is_an_option_for_mitsubas_scenes_alone(folder: Path) -> Non
     (folder / "a.toml").write_text("[[sphere]]\nradius = 1\n")
     with pytest.raises(UsageError, match="approximate"):
         load(folder / "a.toml", approximate=True)
+
+
+def test_convert_writes_the_same_scene(folder: Path) -> None:
+    (folder / "a.xml").write_text(
+        """<scene version="3.0.0"><shape type="rectangle"><bsdf type="roughconductor"><float name="alpha" value="0.04"/>
+        <rgb name="specular_reflectance" value="0.5, 0.25, 1"/></bsdf></shape><emitter type="spot"/></scene>"""
+    )
+    done = CliRunner().invoke(convert, [str(folder / "a.xml"), str(folder / "a.toml")])
+    assert done.exit_code == 0, done.output
+    first, second = load(folder / "a.xml"), load(folder / "a.toml")
+    assert (first.meshes[0].material, first.lights) == (second.meshes[0].material, second.lights)
+    np.testing.assert_array_equal(first.meshes[0].vertices, second.meshes[0].vertices)
 
 
 def test_principled_keeps_its_parameters(folder: Path) -> None:
