@@ -7,17 +7,20 @@ from pathlib import Path
 from ..fuzz import FORMATS, GOOD, case, outcome, run, seeds_in
 from ..fuzz_seeds import write_seeds
 
+#: Formats of which few damaged files load: compressed ones, and scenes, whose every value is checked.
+RARE = {".3mf", ".exr", ".png", ".serialized", ".toml", ".usdc", ".usdz"}
+
 
 def test_damaged_files(tmp_path: Path) -> None:
-    """Several hundred cases in a process with limited memory; some of each format do not load, and some of nearly all
-    formats do (compressed ones rarely)."""
+    """Several hundred cases in a process with limited memory; some of each format do not load, and some of each do,
+    except perhaps of RARE."""
     write_seeds(tmp_path / "seeds")
     told: list[str] = []
     results = run(900, tmp_path, told=told.append)
     assert not told
     assert set(results) == set(FORMATS)
     assert all(counts["error"] and set(counts) <= set(GOOD) for counts in results.values())
-    assert sum(not counts["picture"] for counts in results.values()) < 3
+    assert {name for name, counts in results.items() if not counts["picture"]} <= RARE
     assert sum(count.total() for count in results.values()) == 900
 
 
