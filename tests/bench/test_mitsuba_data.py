@@ -74,7 +74,7 @@ def test_what_others_stand_in_for_is_left_out(tmp_path: Path) -> None:
     ("more", "missing"),
     [
         (BALL.format('<bsdf type="hair"/>').replace("sphere", "torus"), ["shape torus"]),
-        ('<emitter type="spot"/>' + BALL.format('<bsdf type="hair"/>'), ["bsdf hair", "emitter spot"]),
+        ('<emitter type="ies"/>' + BALL.format('<bsdf type="hair"/>'), ["bsdf hair", "emitter ies"]),
     ],
     ids=["shape", "both"],
 )
