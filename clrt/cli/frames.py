@@ -97,6 +97,8 @@ class FrameSequence:
             check_video(video, size or scene.render.size, self._fps)
             check_unprotected(video, self.outputs.force)
         self._of(0).check()
+        for number in () if self.resume else self._numbers:  # finished frames, which are kept, may be read-only
+            self._of(number).check_unprotected()
         return first
 
     def still(self, number: int) -> Scene:
