@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from clrt.errors import SceneError
-from clrt.formats.images import decoder
+from clrt.formats import decoder
 from clrt.formats.images.image_reader import read_picture, read_texels
 from clrt.formats.images.radiance_hdr import read_radiance
 from clrt.output.images import rgbe_rounded, write_image
@@ -348,7 +348,7 @@ def test_a_flat_picture_may_have_a_small_file(tmp_path: Path) -> None:
 
 
 def test_a_decoder_that_hangs_or_crashes_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A pipe without a writer blocks the decoder until its time limit; a killed decoder is replaced."""
+    """A pipe without a writer blocks the decoder until its time limit, once; a killed decoder is replaced."""
     write_image(tmp_path / "a.png", noise(3, 4, 3))
     expected = read_picture(tmp_path / "a.png")
     os.mkfifo(tmp_path / "pipe.png")
@@ -357,10 +357,11 @@ def test_a_decoder_that_hangs_or_crashes_is_an_error(tmp_path: Path, monkeypatch
     np.testing.assert_array_equal(read_picture(tmp_path / "a.png"), expected)
     with monkeypatch.context() as patch:
         patch.setattr(decoder, "LIMIT", 0.5)
+        patch.setattr(decoder, "_Process", None)  # the running process is killed, and no other one is started
         with pytest.raises(SceneError, match="the decoder took more than 0.5 s; the file is damaged"):
-            decoder.decode("picture", tmp_path / "pipe.png")
+            decoder.decode("image", tmp_path / "pipe.png")
     with ThreadPoolExecutor(1) as beside:
-        waiting = beside.submit(decoder.decode, "picture", tmp_path / "pipe.png")
+        waiting = beside.submit(decoder.decode, "image", tmp_path / "pipe.png")
         while decoder._running is None or not decoder._running._popen.pid:
             time.sleep(0.01)
         os.kill(decoder._running._popen.pid, signal.SIGSEGV)

@@ -32,7 +32,7 @@ class GltfData:
         text, self._chunk = split_glb(content) if content.startswith(b"glTF") else (content, None)
         self.document: Document = parse_document(text, ignored)
         self.path = path
-        #: Decompressed values of accessors, (count, components), by index; see scene.gltf_draco.
+        #: Decompressed values of accessors, (count, components), by index; see draco.py.
         self.decoded: dict[int, Array] = {}
         self._buffers: dict[int, Bytes] = {}
         self._decompressed: dict[int, Bytes] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 from ...errors import SceneError
-from ..images.decoder import decode
+from ..decoder import decode
 from . import schema as gltf
 from .accessors import GltfData
 

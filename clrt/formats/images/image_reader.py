@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...file_names import StrPath
+from ..decoder import decode
 from ..referenced_files import check_file
-from .decoder import decode
 from .radiance_hdr import read_radiance
 
 #: Magic bytes of images embedded in glTF, with their position, and the file suffix of that format.
@@ -87,7 +87,7 @@ def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], str]:
             "pip install opengl-basisu, or export the textures as PNG or JPEG"
         )
     try:
-        arrays, facts = decode(DECODERS.get(suffix, "picture"), source, suffix)
+        arrays, facts = decode(DECODERS.get(suffix, "image"), source, suffix)
     except SceneError as error:
         raise SceneError(f"{name}: cannot be decoded as an image: {error}") from None
     if "refused" in facts:

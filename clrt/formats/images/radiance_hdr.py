@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...scene.spectra import RGB_FROM_XYZ
-from .decoder_process import fits
+from .stored_images import fits
 
 Bytes = NDArray[np.uint8]
 _HEADER = re.compile(rb"#\?[^\r\n]{0,4096}\r?\n((?:[^\r\n]{1,4096}\r?\n){0,1000}?)\r?\n")

@@ -20,7 +20,7 @@ from ...file_names import printable
 from ...scene.editing import free_name
 from ...scene.validation.validate import index_problems
 from ..archives import check_archive
-from ..images.decoder import decode
+from ..decoder import decode
 from ..seams import with_corner_attributes
 from .properties import Appearance, Properties
 

@@ -24,9 +24,9 @@ from ...scene.geometry.transform import Matrix, scaling
 from ...scene.model import Mesh, Model
 from ...scene.validation.validate import mesh_problems
 from ..archives import check_archive
+from ..decoder import decode
 from ..frame_model import bounds
 from ..gltf.instancing import shown
-from ..images.decoder import decode
 from ..model_choice import DEFAULT, ModelChoice, chosen
 from ..referenced_files import note_read
 from ..up_axis import upright

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...awake import wait_awake
-from ...errors import SceneError
-from ...file_names import utf8_path
-from ...threads import Event, beside
+from ..awake import wait_awake
+from ..errors import SceneError
+from ..file_names import utf8_path
+from ..threads import Event, beside
 
 #: Time limit per file in seconds. The largest supported image takes a tenth of it.
 LIMIT = 60.0
@@ -35,8 +35,8 @@ _running: _Process | None = None
 def decode(kind: str, source: Path | bytes, suffix: str = "", **options: Any) -> tuple[Arrays, dict[str, Any]]:
     """Decode a file, or bytes of a file with the name suffix `suffix`, and return its arrays and other facts.
 
-    kind: one of decoder_process.KINDS or MODULES, whose function also gets the options. Raises SceneError with its
-    message, or with how the process ended.
+    kind: one of decoder_process.DECODERS, whose function also gets the options. Raises SceneError with its message, or
+    with how the process ended.
     """
     try:
         if isinstance(source, Path):
@@ -55,23 +55,27 @@ def decode(kind: str, source: Path | bytes, suffix: str = "", **options: Any) ->
 def _decoded(request: list[Any]) -> tuple[Arrays, dict[str, Any]]:
     global _running
     with _lock:
-        if _running is not None and _running.owner == os.getpid():
-            with suppress(_Ended):  # it may merely have exited after being idle
-                return _running.decode(request)
-        _running = _Process()
-        try:
-            return _running.decode(request)
-        except _Ended as end:
-            _running = None
-            raise SceneError(f"the decoder {end}; the file is damaged or too large") from None
+        while True:
+            reused = _running if _running is not None and _running.owner == os.getpid() else None
+            _running = process = reused or _Process()
+            try:
+                return process.decode(request)
+            except _Ended as end:
+                _running = None
+                if reused is None or end.late:  # otherwise it may merely have exited after being idle
+                    raise SceneError(f"the decoder {end}; the file is damaged or too large") from None
 
 
 class _Ended(Exception):
-    """The decoder process has ended; the message says how."""
+    """The decoder process has ended; the message says how. late: whether it was killed, since it took too long."""
+
+    def __init__(self, how: str, late: bool) -> None:
+        super().__init__(how)
+        self.late = late
 
 
 class _Process:
-    """Child process that runs scene.decoding. `owner`: the pid that started it; a forked process must not use it."""
+    """Child process that runs decoder_process. `owner`: the pid that started it; a forked process must not use it."""
 
     def __init__(self) -> None:
         import subprocess  # most scenes need no decoder
@@ -79,7 +83,7 @@ class _Process:
         path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
         self.owner = os.getpid()
         self._popen = subprocess.Popen(
-            [sys.executable, "-P", "-m", "clrt.formats.images.decoder_process"],
+            [sys.executable, "-P", "-m", "clrt.formats.decoder_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -109,7 +113,8 @@ class _Process:
                 raise EOFError
             arrays = {name: self._array(shape, dtype) for name, (shape, dtype) in reply["arrays"].items()}
         except (OSError, EOFError):
-            raise _Ended(f"took more than {LIMIT:g} s" if late.is_set() else self._how_it_ended()) from None
+            how = f"took more than {LIMIT:g} s" if late.is_set() else self._how_it_ended()
+            raise _Ended(how, late.is_set()) from None
         except BaseException:  # e.g. KeyboardInterrupt: later replies would not match their requests
             self._popen.kill()
             raise

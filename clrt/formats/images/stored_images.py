@@ -1,40 +1,22 @@
-"""Decoder process that scene.decoder starts as `python -m clrt.formats.images.decoder_process`.
-
-It reads one request per line, [kind, file, options] in JSON. A reply is one line of JSON, {"error": ...} or {"arrays":
-{name: [shape, dtype]}, "facts": ...}, followed by the bytes of the arrays.
-"""
+"""Images as their files store them, read by libraries in the decoder process."""
 
 from __future__ import annotations
 
-import json
 import os
-import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
-from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..decoder_process import MOST_BYTES
 from .color_channels import LUMINANCE_CHROMA, NoColorError, color_channels
 
 Found = tuple[dict[str, NDArray[Any]], dict[str, Any]]
 
-#: Memory limit of this process in bytes, and of the largest image: 16384 x 8192 pixels of four floats.
-MOST_MEMORY = 8 * 2**30
-MOST_BYTES = 2**31
 #: An image larger than FREE_BYTES (8192 x 8192) is rejected if it decodes to more than MOST_RATIO times its file's
 #: size; deflate reaches 1032.
 FREE_BYTES = 2**28
 MOST_RATIO = 2000
-#: Memory for a file that a decoder of MODULES reads: FREE_MEMORY, and MEMORY_RATIO times the file's size.
-FREE_MEMORY = 2**31
-MEMORY_RATIO = 100
-#: Idle seconds after which the process exits.
-IDLE = 2.0
 #: Parts of an image that are looked at.
 MOST_PARTS = 256
 
@@ -50,7 +32,7 @@ def check_size(file: str, width: int, height: int, decoded: int) -> None:
         raise ValueError(f"{os.path.getsize(file)} bytes cannot contain {width}x{height} pixels")
 
 
-def picture(file: str) -> Found:
+def image(file: str) -> Found:
     """Return an image's pixels, (h, w, c) uint8, uint16 or float32 as stored, with unassociated alpha: red, green and
     blue, or grey, then alpha if there is any. They fill the display window, and are black outside of the data window.
 
@@ -134,21 +116,8 @@ def _complaint(buffer: Any) -> str:
         return "its header is damaged"
 
 
-def draco(file: str) -> Found:
-    """Decode a Draco mesh: faces (m, 3) uint32, and each attribute (n, k) as "attribute ID"."""
-    import DracoPy
-
-    with open(file, "rb") as content:
-        mesh = DracoPy.decode(content.read())
-    faces = np.asarray(mesh.faces, np.uint32).reshape(-1, 3)
-    return {
-        "faces": faces,
-        **{f"attribute {attribute['unique_id']}": np.asarray(attribute["data"]) for attribute in mesh.attributes},
-    }, {}
-
-
 def avif(file: str) -> Found:
-    """Decode an AVIF image to 8 bits per channel; pixels and facts as those of `picture`."""
+    """Decode an AVIF image to 8 bits per channel; pixels and facts as those of `image`."""
     from PIL import Image, features
 
     if not features.check("avif"):
@@ -159,91 +128,9 @@ def avif(file: str) -> Found:
 
 
 def basis(file: str) -> Found:
-    """Decode a KTX 2 image of Basis Universal; pixels and facts as those of `picture`."""
+    """Decode a KTX 2 image of Basis Universal; pixels and facts as those of `image`."""
     import opengl_basisu
 
     image = opengl_basisu.open(file)
     check_size(file, image.width, image.height, 4 * image.width * image.height)
     return {"pixels": image.transcode("rgba8").data}, {"channels": "RGBA"}
-
-
-KINDS: dict[str, Callable[..., Found]] = {"picture": picture, "draco": draco, "avif": avif, "basis": basis}
-#: Modules whose function `decode` decodes further kinds of file.
-MODULES = {"3mf": "clrt.formats.threemf.package", "usd": "clrt.formats.usd.stage"}
-
-
-def _decoder(kind: str) -> Callable[..., Found]:
-    """Return the function that decodes files of a kind."""
-    function: Callable[..., Found] = KINDS.get(kind) or import_module(MODULES[kind]).decode
-    return function
-
-
-def main() -> None:
-    """Answer requests until standard input ends. The libraries' own output is redirected to standard error."""
-    with os.fdopen(os.dup(1), "wb") as replies:
-        os.dup2(2, 1)
-        _limit()
-        while True:
-            idle = threading.Timer(IDLE, os._exit, [0])
-            idle.start()
-            line = sys.stdin.readline()
-            idle.cancel()
-            if not line:
-                os._exit(0)  # skips unloading the libraries, which may crash
-            _answer(replies, *json.loads(line))
-
-
-def _answer(replies: Any, kind: str, file: str, options: dict[str, Any]) -> None:
-    arrays: dict[str, NDArray[Any]] = {}
-    facts: dict[str, Any] = {}
-    try:
-        with _memory_for(file) if kind in MODULES else nullcontext():
-            arrays, facts = _decoder(kind)(file, **options)
-        reply: dict[str, Any] = {"facts": facts}
-    except MemoryError:
-        reply = {"error": "it needs too much memory"}
-    except Exception as error:  # a damaged file may make the libraries raise anything
-        reply = {"error": str(error) or type(error).__name__}
-    if sum(array.nbytes for array in arrays.values()) > MOST_BYTES:
-        arrays, reply = {}, {"error": f"its content exceeds {MOST_BYTES >> 30} GiB"}
-    arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-    reply["arrays"] = {name: [array.shape, array.dtype.str] for name, array in arrays.items()}
-    replies.write(json.dumps(reply).encode() + b"\n")
-    for array in arrays.values():
-        replies.write(array.reshape(-1).view(np.uint8).data)
-    replies.flush()
-
-
-@contextmanager
-def _memory_for(file: str) -> Iterator[None]:
-    """Limit further memory in proportion to a file, where the system says how much there is in use."""
-    try:
-        used = int(Path("/proc/self/statm").read_text().split()[5]) * os.sysconf("SC_PAGE_SIZE")
-    except OSError:
-        yield
-        return
-    import resource
-
-    before = resource.getrlimit(resource.RLIMIT_DATA)
-    most = used + FREE_MEMORY + MEMORY_RATIO * os.path.getsize(file)
-    with suppress(ValueError):
-        resource.setrlimit(resource.RLIMIT_DATA, (most, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_DATA, before)
-
-
-def _limit() -> None:
-    """Limit memory, if the system supports it, and disable core dumps."""
-    if sys.platform != "win32":
-        import resource
-
-        for kind, most in ((resource.RLIMIT_AS, MOST_MEMORY), (resource.RLIMIT_CORE, 0)):
-            hard = resource.getrlimit(kind)[1]
-            with suppress(ValueError):  # some systems refuse a limit
-                resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
-
-
-if __name__ == "__main__":
-    main()
