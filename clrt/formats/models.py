@@ -24,6 +24,7 @@ from ..scene.model import Instance, Mesh, Model
 from ..scene.validation.validate import mesh_problems
 from .images.image_reader import linear_from_srgb
 from .model_choice import DEFAULT, ModelChoice
+from .placed_meshes import shown
 from .referenced_files import check_file, name_of
 
 log = logging.getLogger(__name__)
@@ -156,8 +157,6 @@ def _placed(
     """Return the meshes in world coordinates, or as instances where these save memory."""
     if places is None:
         return meshes, []
-    from .gltf.instancing import shown  # most formats have no places
-
     by_name = {mesh.name: mesh for mesh in meshes}
     return shown((by_name[name], matrix) for name, matrix in places if name in by_name)
 

@@ -63,6 +63,11 @@ class Mesh:
             narrow = faces.astype(np.int32, copy=False)
             self.faces = narrow if np.array_equal(faces, narrow) else faces
 
+    @property
+    def has_alpha(self) -> bool:
+        """Whether the alpha of its vertex colors is less than 1 somewhere."""
+        return self.colors is not None and self.colors.shape[1] == 4 and bool((self.colors[:, 3] < 1).any())
+
 
 @dataclass(eq=False)
 class Instance:

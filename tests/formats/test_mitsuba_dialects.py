@@ -14,7 +14,7 @@ from clrt.cli.info import command as info
 from clrt.errors import SceneError, UsageError
 from clrt.formats.images.image_reader import linear_from_srgb, read_picture
 from clrt.formats.load_scene import load
-from clrt.formats.mitsuba.environment_map import resampled, rows_at_middles
+from clrt.formats.mitsuba.environment_map import rows_at_middles, turned_map
 from clrt.formats.mitsuba.values import blackbody
 from clrt.output.images import write_image
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
@@ -174,7 +174,7 @@ def rotated(matrix: np.ndarray) -> np.ndarray:
     """Return an environment map of Mitsuba's, 1 + its direction, resampled after this matrix; and by direction."""
     height, width = 257, 512
     theta, phi = np.pi * np.arange(height) / (height - 1), 2 * np.pi * (np.arange(width) + 0.5) / width
-    return resampled(np.asarray(1 + directions(theta, phi), np.float32), matrix)
+    return turned_map(np.asarray(1 + directions(theta, phi), np.float32), matrix)
 
 
 def directions(theta: np.ndarray, phi: np.ndarray) -> np.ndarray:

@@ -150,7 +150,17 @@ def test_dome_lights(tmp_path: Path, up: str, turn: str) -> None:
     x, y, z = np.sin(azimuth) * np.sin(polar), np.cos(polar), -np.cos(azimuth) * np.sin(polar)  # of Environment
     world = np.stack([x, -z, y] if up == "Z" else [x, y, z], axis=2)  # in the stage's axes
     own = np.stack([world[..., 0], world[..., 2], -world[..., 1]], axis=2) if turn else world
-    np.testing.assert_allclose(image / 2 - 1, own, atol=0.1)
+    np.testing.assert_allclose(image / 2 - 1, own, atol=0.01)
+
+
+def test_domes_turned_about_the_vertical_are_not_resampled(tmp_path: Path) -> None:
+    stored = direction_image(tmp_path)
+    turn = 'float xformOp:rotateY = 30\nuniform token[] xformOpOrder = ["xformOp:rotateY"]\n'
+    environment = load(usda(tmp_path, lit("DomeLight", f"asset inputs:texture:file = @dome.exr@\n{turn}"))).environment
+    assert environment.image is not None and environment.rotation_degrees == pytest.approx(30)
+    still = load(usda(tmp_path, lit("DomeLight", "asset inputs:texture:file = @dome.exr@"))).environment
+    np.testing.assert_array_equal(environment.image, still.image)
+    np.testing.assert_allclose(np.sort(environment.image, axis=None), np.sort(stored, axis=None), rtol=1e-3)
 
 
 def test_constant_domes(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
         plugin = plugin if "TRANSMISSION" in material.features() else {"type": "twosided", "front": plugin}
         if material.one_sided:
             raise ValueError("one-sided surfaces")
-        if isinstance(owner, Mesh) and owner.colors is not None and owner.colors.shape[1] == 4:
+        if isinstance(owner, Mesh) and owner.has_alpha:
             plugin = {"type": "mask", "opacity": _vertex_opacity(material), "bsdf": plugin}
         elif material.opacity != 1:
             plugin = {"type": "mask", "opacity": _opacity(material), "bsdf": plugin}

@@ -131,7 +131,7 @@ def _mesh(mesh: Mesh) -> Plugin:
     if mesh.colors is not None:
         color = getattr(mesh.material, "color", 1.0)
         arrays["colors"] = mesh.colors[:, :3] * np.float32(1.0 if isinstance(color, Texture) else color)
-        if mesh.colors.shape[1] == 4 and not isinstance(mesh.material.opacity, Texture):
+        if mesh.has_alpha and not isinstance(mesh.material.opacity, Texture):
             arrays["opacity"] = mesh.colors[:, 3] * np.float32(mesh.material.opacity)
     return {"type": "mesh", **arrays}
 

@@ -54,8 +54,7 @@ def mesh_glb(mesh: Mesh) -> bytes:
         for name, array in arrays.items()
     }
     primitive = {"attributes": attributes, "indices": add(mesh.faces.astype("<u4").ravel(), _UINT)}
-    has_alpha = mesh.colors is not None and mesh.colors.shape[1] == 4
-    if has_alpha:
+    if mesh.has_alpha:
         primitive["material"] = 0
     document = {
         "asset": {"version": "2.0", "generator": "clrt"},
@@ -66,7 +65,7 @@ def mesh_glb(mesh: Mesh) -> bytes:
         "buffers": [{"byteLength": len(binary)}],
         "bufferViews": views,
         "accessors": accessors,
-        **({"materials": [{"alphaMode": "BLEND"}]} if has_alpha else {}),
+        **({"materials": [{"alphaMode": "BLEND"}]} if mesh.has_alpha else {}),
     }
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)

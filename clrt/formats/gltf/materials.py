@@ -2,47 +2,46 @@
 
 from __future__ import annotations
 
-import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SceneError
+from ...scene.materials.material import MOST_IOR
 from ...scene.materials.material_types import Diffuse, Material, MetallicRoughness
-from ...scene.materials.textures import Channel, Picture, Texture, Wrap
-from ..images.image_reader import read_texels
+from ...scene.materials.textures import Channel, Texture
 from . import material_schema as looks, schema as gltf
 from .accessors import GltfData
 from .solid_glass import glass, solid_faces, tinted
 from .specular_glossiness import converted, rough_picture
+from .textures import Textures
 
-log = logging.getLogger(__name__)
-
-WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
-NEAREST = 9728
-#: Upper limit of a material's ior.
-MOST_IOR = 4.0
 #: Value of a base color texture that cannot be read.
 GREY = 0.8
 
 
+class MaterialPart(NamedTuple):
+    """A material, the triangles of a primitive that it is on, (m, 3), and their vertex colors, with alpha if that
+    counts."""
+
+    material: Material
+    faces: NDArray[np.int32]
+    colors: NDArray[np.float32] | None
+
+
 class Materials:
-    """Materials of one file; each image is read once."""
+    """Materials of one file."""
 
     def __init__(self, data: GltfData, variant: int | None = None) -> None:
         self._data, self._variant = data, variant
         self._names = gltf.unique_names("material", [material.name for material in data.document.materials])
-        self._pictures: dict[int, Picture] = {}
-        self._chosen: dict[tuple[int, ...], Picture | None] = {}
-        self._derived: dict[tuple[int, float], Picture] = {}
+        self.textures = Textures(data)
+        self._texture, self._bend = self.textures.texture, self.textures.normal_map
         #: Features that had an effect in the file, but are not rendered, by the material's name.
         self.unused: dict[str, list[str]] = {}
-        #: Textures that could not be read, and why; a warning was logged for each.
-        self.unread: list[str] = []
 
     def name(self, primitive: gltf.Primitive) -> str:
         """Return the name of the primitive's material, empty if it has none."""
@@ -63,11 +62,10 @@ class Materials:
         uv: list[NDArray[np.float32] | None],
         faces: NDArray[np.int32],
         colors: NDArray[np.float32] | None,
-    ) -> list[tuple[Material, NDArray[np.int32], NDArray[np.float32] | None]]:
+    ) -> list[MaterialPart]:
         """Return the primitive's material with all values clamped to their limits, or the specification's default if it
-        has none, the faces that it is on (those of solid glass have one of their own), and its vertex colors, with
-        alpha if that counts. uv, faces, colors: the primitive's texture coordinates, both sets, triangles and vertex
-        colors.
+        has none; triangles of solid glass have one of their own. uv, faces, colors: the primitive's texture
+        coordinates, both sets, triangles and vertex colors.
 
         A texture is replaced by white if the primitive has no coordinates for it or if it cannot be read; a base color
         texture by grey, an emission texture by black.
@@ -75,7 +73,7 @@ class Materials:
         index = self._index(primitive)
         opaque = colors if colors is None or colors.shape[1] == 3 else colors[:, :3]
         if index is None:
-            return [(MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0), faces, opaque)]
+            return [MaterialPart(MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0), faces, opaque)]
         source = converted(gltf.entry(self._data.document.materials, index, "material", user))
         pbr, extensions = source.pbrMetallicRoughness, source.extensions
         base = self._texture(pbr.baseColorTexture, primitive, user)
@@ -87,7 +85,7 @@ class Materials:
                 index,
                 {"the variation of vertex colors": colors is not None and bool(np.ptp(colors[:, :3], axis=0).any())},
             )
-            return [(_unlit(color, colors, coverage), faces, colors)]
+            return [MaterialPart(_unlit(color, colors, coverage), faces, colors)]
         made = MetallicRoughness(
             color=color,
             emission=self._emission(source, primitive, user),
@@ -100,14 +98,14 @@ class Materials:
         )
         made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
         solid = solid_faces(extensions, made, uv, faces)
-        parts: list[tuple[Material, NDArray[np.int32], NDArray[np.float32] | None]] = []
+        parts: list[MaterialPart] = []
         if not solid.all():
-            parts.append((replace(tinted(extensions, made), **coverage), faces[~solid], colors))
+            parts.append(MaterialPart(replace(tinted(extensions, made), **coverage), faces[~solid], colors))
             volume = extensions.KHR_materials_volume.thicknessFactor > 0
             transmits = made.transmission != 0 or made.diffuse_transmission != 0
             self._note(index, {"volume": volume and transmits and made.metallic != 1})
         if solid.any():
-            parts.append((glass(extensions, made), faces[solid], opaque))
+            parts.append(MaterialPart(glass(extensions, made), faces[solid], opaque))
             layers = {
                 layer.lower(): layer in made.features()
                 for layer in ("CLEARCOAT", "SHEEN", "SPECULAR", "ANISOTROPY", "IRIDESCENCE")
@@ -131,20 +129,13 @@ class Materials:
             gloss = self._texture(old.specularGlossinessTexture, primitive, user)
             if gloss is None:
                 return {"metallic": 0.0, "roughness": pbr.roughnessFactor}
-            picture = self._picture_from(gloss.picture, old.glossinessFactor, rough_picture)
+            picture = self.textures.derived(gloss.picture, old.glossinessFactor, rough_picture)
             return {"metallic": 0.0, "roughness": replace(gloss, picture=picture, channel="green")}
         texture = self._texture(pbr.metallicRoughnessTexture, primitive, user)
         return {
             "metallic": _numbered(_unit(pbr.metallicFactor), texture, "blue"),
             "roughness": _numbered(_unit(pbr.roughnessFactor), texture, "green"),
         }
-
-    def _picture_from(self, picture: Picture, factor: float, make: Callable[[Picture, float], Picture]) -> Picture:
-        """Return an image made of another one, the same for the same factor."""
-        key = id(picture), factor
-        if key not in self._derived:
-            self._derived[key] = make(picture, factor)
-        return self._derived[key]
 
     def _layers(self, extensions: looks.MaterialExtensions, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
         """Return the fields for the extensions in use."""
@@ -218,14 +209,6 @@ class Materials:
             "anisotropy_map": directions,
         }
 
-    def _bend(self, info: looks.NormalTextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
-        """Return a normal map; a negative scale tilts to the other side."""
-        texture = self._texture(info, primitive, user)
-        if texture is None or info is None:
-            return None
-        turned = self._picture_from(texture.picture, info.scale, _turned) if info.scale < 0 else texture.picture
-        return replace(texture, picture=turned, factor=abs(info.scale))
-
     def _emission(
         self, source: looks.Material, primitive: gltf.Primitive, user: str
     ) -> tuple[float, float, float] | Texture:
@@ -233,60 +216,6 @@ class Materials:
         red, green, blue = (strength * max(value, 0.0) for value in source.emissiveFactor)
         glow = self._texture(source.emissiveTexture, primitive, user) if max(red, green, blue) else None
         return _colored((red, green, blue), glow, source.emissiveTexture, 0.0)
-
-    def _texture(self, info: looks.TextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
-        """Return a texture; None if there is none, if its coordinates are missing, or if its image cannot be read."""
-        if info is None:
-            return None
-        texture = gltf.entry(self._data.document.textures, info.index, "texture", user)
-        placed = info.extensions.KHR_texture_transform
-        uv_set = info.texCoord if placed.texCoord is None else placed.texCoord
-        if uv_set > 1 or f"TEXCOORD_{uv_set}" not in primitive.attributes:
-            log.warning("%s: %s has no texture coordinates %d; its texture is left out", self._data.path, user, uv_set)
-            return None
-        picture = self._first_picture(texture.sources, f"texture {info.index}")
-        if picture is None:
-            return None
-        sampler = looks.Sampler()
-        if texture.sampler is not None:
-            sampler = gltf.entry(self._data.document.samplers, texture.sampler, "sampler", f"texture {info.index}")
-        wrap = WRAPS[sampler.wrapS], WRAPS[sampler.wrapT]
-        return Texture(
-            picture=picture,
-            uv_set=uv_set,
-            offset=placed.offset,
-            scale=placed.scale,
-            wrap=wrap,
-            rotation_degrees=math.degrees(placed.rotation),
-            filter="nearest" if sampler.magFilter == NEAREST else "linear",
-        )
-
-    def _first_picture(self, sources: tuple[int, ...], user: str) -> Picture | None:
-        """Return the first of these images that can be read; None, with a warning, if none can."""
-        if not sources or sources in self._chosen:
-            return self._chosen.get(sources)
-        faults = list[str]()
-        self._chosen[sources] = None
-        for index in sources:
-            try:
-                self._chosen[sources] = self._picture(index, user)
-                return self._chosen[sources]
-            except SceneError as error:
-                faults.append(str(error))
-        self.unread.append(f"a texture: {'; '.join(faults)}")
-        log.warning("%s: a texture is left out: %s", self._data.path, "; ".join(faults))
-        return None
-
-    def _picture(self, index: int, user: str) -> Picture:
-        if index not in self._pictures:
-            image = gltf.entry(self._data.document.images, index, "image", user)
-            content = (
-                self._data.resource(image.uri or "", user)
-                if image.bufferView is None
-                else self._data.view(image.bufferView, user).tobytes()
-            )
-            self._pictures[index] = Picture(read_texels(content, f"image {index}"), image.name or f"image {index}")
-        return self._pictures[index]
 
 
 def _unlit(
@@ -298,13 +227,6 @@ def _unlit(
         red, green, blue = (factor * colors[:, :3].mean(axis=0, dtype=np.float64)).tolist()
         color = replace(color, factor=(red, green, blue)) if isinstance(color, Texture) else (red, green, blue)
     return Diffuse(color=(0.0, 0.0, 0.0), emission=color, double_sided=True, **coverage)
-
-
-def _turned(picture: Picture, scale: float) -> Picture:
-    """Return a normal map whose x and y are negated."""
-    texels = picture.texels.copy()
-    texels[..., :2] = 255 - texels[..., :2]
-    return Picture(texels, picture.name)
 
 
 def _coverage(source: looks.Material, base: Texture | None) -> dict[str, Any]:

@@ -101,16 +101,15 @@ def _stored(data: GltfData, materials: Materials, index: int) -> Iterator[Stored
         colors = _colors(data, primitive, len(vertices), where)
         influences = read_influences(data, primitive, len(vertices), where)
         for part in materials.materials(primitive, where, [uv, uv1], corners.astype(np.int32), colors):
-            material, faces, part_colors = part
             mesh = Mesh(
                 vertices,
-                faces,
-                material,
+                part.faces,
+                part.material,
                 normal,
                 name,
                 uv=uv,
                 uv1=uv1,
-                colors=part_colors,
+                colors=part.colors,
                 tangents=tangent,
                 material_name=materials.name(primitive),
             )

@@ -23,12 +23,13 @@ from ...scene.model import Mesh, Model
 from ...scene.validation.validate import mesh_problems
 from ..frame_model import bounds
 from ..model_choice import DEFAULT, ModelChoice, chosen
+from ..placed_meshes import shown
 from . import schema as gltf
 from .accessors import GltfData
 from .animations import Clip, animation_names
 from .cameras import read_cameras
 from .graph import NodeGraph
-from .instancing import matrices, shown
+from .instancing import matrices
 from .light_units import guess_unit, to_radiometric
 from .lights import read_lights
 from .materials import Materials
@@ -172,5 +173,5 @@ class GltfFile:
         return {
             **self._names,
             "extensions": sorted(used & gltf.EXTENSIONS),
-            "left_out": [*reasons, *self._materials.unread],
+            "left_out": [*reasons, *self._materials.textures.unread],
         }

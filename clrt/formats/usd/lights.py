@@ -19,6 +19,7 @@ from ...scene.materials.material_types import Diffuse
 from ...scene.materials.textures import Picture, Texture
 from ...scene.model import Environment, Mesh
 from ..images.image_reader import linear_from_srgb, read_picture
+from ..images.turned_environment import interpolated, resampled, turned_about_y
 from .materials import Materials
 from .solids import SEGMENTS, solid
 
@@ -158,7 +159,14 @@ def _dome(
     turn = unit(matrix[:3, :3].T).T  # columns are the dome's axes in the scene
     if light["pole"] == "Z":
         turn = turn[:, [1, 2, 0]]
-    return Environment(image=image if np.allclose(turn, np.eye(3)) else _turned(image, turn))
+    if (angle := turned_about_y(turn)) is not None:
+        return Environment(image=image, rotation_degrees=angle)
+    rows, columns = image.shape[:2]
+
+    def lookup(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        return interpolated(image, u * columns - 0.5, v * rows - 0.5)
+
+    return Environment(image=resampled(lookup, turn, rows))
 
 
 def _panorama(path: Path, number: int, materials: Materials) -> NDArray[np.float32] | None:
@@ -171,21 +179,6 @@ def _panorama(path: Path, number: int, materials: Materials) -> NDArray[np.float
     except SceneError as error:
         log.warning("%s: the texture of a dome light is ignored: %s", path, error)
         return None
-
-
-def _turned(image: NDArray[np.float32], turn: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return an environment map turned by a matrix (3, 3), by the nearest texel."""
-    height, width = image.shape[:2]
-    azimuth = (np.arange(width) + 0.5) * 2 * pi / width
-    polar = ((np.arange(height) + 0.5) * pi / height)[:, None]
-    x, y, z = np.sin(azimuth) * np.sin(polar), np.cos(polar) + 0 * azimuth, -np.cos(azimuth) * np.sin(polar)
-    rows = np.empty((height, width), np.int64)
-    columns = np.empty((height, width), np.int64)
-    for row in range(height):
-        own = np.column_stack([x[row], y[row], z[row]]) @ turn  # the inverse of a rotation is its transpose
-        rows[row] = (np.arccos(own[:, 1].clip(-1, 1)) / pi * height).clip(0, height - 1)
-        columns[row] = (np.arctan2(own[:, 0], -own[:, 2]) / (2 * pi) % 1 * width).clip(0, width - 1)
-    return np.ascontiguousarray(image[rows, columns])
 
 
 def _rgb(values: NDArray[np.float64]) -> Vector:

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...file_names import printable
+from ...scene.materials.material import MOST_IOR
 from ...scene.materials.material_types import MetallicRoughness
 from ...scene.materials.textures import Channel, Picture, Texture, Wrap
-from ..images.image_reader import linear_from_srgb, read_texels
+from ..images.image_reader import linear_from_srgb, read_texels, srgb_from_linear
 from ..referenced_files import find_file
 
 log = logging.getLogger(__name__)
@@ -43,8 +44,7 @@ DEFAULTS: dict[str, Any] = {
     "ior": 1.5,
     "useSpecularWorkflow": 0,
 }
-#: Limit of a material's ior, and its reflectance at normal incidence.
-MOST_IOR = 4.0
+#: Reflectance of the largest ior at normal incidence.
 MOST_REFLECTANCE = ((MOST_IOR - 1) / (MOST_IOR + 1)) ** 2
 #: Primvars of vertex colors.
 DISPLAY_COLOR = "displayColor"
@@ -265,16 +265,11 @@ def _mapped(
     result = texels.copy()
     for channel in range(4):
         is_color = channel < 3
-        values = (linear_from_srgb(steps) if decode and is_color else steps).astype(np.float64)
-        values = (values * scale[channel] + bias[channel]).clip(0, 1)
-        values = _srgb(values) if encode and is_color else values
+        values = linear_from_srgb(steps) if decode and is_color else steps
+        values = (values * scale[channel] + bias[channel]).clip(0, 1).astype(np.float32)
+        values = srgb_from_linear(values) if encode and is_color else values
         result[..., channel] = np.rint(values * 255).astype(np.uint8)[texels[..., channel]]
     return result
-
-
-def _srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Encode linear values from 0 to 1 as sRGB."""
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 def _ior(ior: float) -> float:

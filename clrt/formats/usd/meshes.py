@@ -160,8 +160,7 @@ class Shapes:
         opacity, (4,); varies: whether the vertices have colors."""
         white = (1.0, 1.0, 1.0)
         if look is None:
-            plain = Diffuse(color=white, double_sided=facts["double_sided"]) if varies else Diffuse()
-            plain = replace(plain, double_sided=facts["double_sided"])
+            plain = replace(Diffuse(color=white) if varies else Diffuse(), double_sided=facts["double_sided"])
             return plain if color is None else replace(plain, color=tuple(color[:3].tolist()), opacity=float(color[3]))
         material: Material = look.material
         if color is not None:

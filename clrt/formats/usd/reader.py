@@ -26,8 +26,8 @@ from ...scene.validation.validate import mesh_problems
 from ..archives import check_archive
 from ..decoder import decode
 from ..frame_model import bounds
-from ..gltf.instancing import shown
 from ..model_choice import DEFAULT, ModelChoice, chosen
+from ..placed_meshes import shown
 from ..referenced_files import note_read
 from ..up_axis import upright
 from .cameras import read_cameras

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,14 +83,15 @@ class Visit(NamedTuple):
 
 
 class _Content:
-    """What is found below prims; `matrices` act on row vectors."""
+    """What is found below prims; `matrices` act on row vectors. Below prototypes of point instancers, `outer` is the
+    content that they are part of, whose shapes and materials are shared."""
 
-    def __init__(self, code: Any, depth: int = 0) -> None:
-        self._code, self._depth = code, depth
-        self.arrays: dict[str, Array] = {}
-        self.ignored: Counter[str] = Counter()
-        self.materials = Materials(code, self.arrays, self.ignored)
-        self.shapes = Shapes(code, self.arrays, self.materials, self.ignored)
+    def __init__(self, code: Any, outer: _Content | None = None) -> None:
+        self._code, self._depth = code, 0 if outer is None else outer._depth + 1
+        self.arrays: dict[str, Array] = outer.arrays if outer else {}
+        self.ignored: Counter[str] = outer.ignored if outer else Counter()
+        self.materials = outer.materials if outer else Materials(code, self.arrays, self.ignored)
+        self.shapes = outer.shapes if outer else Shapes(code, self.arrays, self.materials, self.ignored)
         self.lights: list[dict[str, Any]] = []
         self.cameras: list[dict[str, Any]] = []
         self._numbers: list[Array] = [np.zeros(0, np.int64)]
@@ -179,24 +179,18 @@ class _Content:
             chosen = transforms[shown & (indices == number)]
             root = prim.GetStage().GetPrimAtPath(target)
             if len(chosen) and root:
-                for numbers, matrices in self._prototype(root, len(chosen)):
-                    self._place(numbers, (matrices[:, None] @ (chosen @ matrix)[None]).reshape(-1, 4, 4))
+                numbers, matrices = self._prototype(root, len(chosen))
+                self._place(numbers, (matrices[:, None] @ (chosen @ matrix)[None]).reshape(-1, 4, 4))
 
-    def _prototype(self, root: Any, count: int) -> Iterator[tuple[Array, Array]]:
-        """Yield the numbers of a prototype's shapes, each `count` times, and their own matrices."""
-        inner = _Content(self._code, self._depth + 1)
+    def _prototype(self, root: Any, count: int) -> tuple[Array, Array]:
+        """Return the numbers of a prototype's shapes, each `count` times, and their own matrices."""
+        inner = _Content(self._code, self)
         if inner._depth > MOST_DEPTH:
             raise ValueError(f"its point instancers are nested more than {MOST_DEPTH} deep")
-        inner.arrays, inner.ignored, inner.materials, inner.shapes = (
-            self.arrays,
-            self.ignored,
-            self.materials,
-            self.shapes,
-        )
         inner.add(root)
         self.ignored["lights of point instancers"] += len(inner.lights)
         numbers, matrices = inner.places()
         self._prims += inner._prims
         if len(numbers) * count > MOST_PLACES:
             raise ValueError(f"it places more than {MOST_PLACES} meshes")
-        yield np.repeat(numbers, count), matrices
+        return np.repeat(numbers, count), matrices

@@ -20,6 +20,8 @@ Parameter = float | tuple[float, ...] | Texture
 
 #: Below this alpha GGX exceeds float32 (D ~ 1/(pi alpha²)), also in the kernel; use `Mirror` for perfect reflection.
 ALPHA_MIN = 1e-4
+#: Largest index of refraction.
+MOST_IOR = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)

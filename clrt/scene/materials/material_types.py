@@ -13,7 +13,7 @@ from typing import Annotated, ClassVar, Literal
 
 from ..fields.limits import Ge, Gt, Le
 from .dielectric_energy import ROWS, tables
-from .material import Albedo as Albedo, Material as Material, Parameter, Unit
+from .material import MOST_IOR, Albedo as Albedo, Material as Material, Parameter, Unit
 from .metallic_roughness import MetallicRoughness as MetallicRoughness
 from .presets import CONDUCTORS, ConductorPreset
 from .textures import NonNegative, Texture
@@ -99,7 +99,7 @@ class Dielectric(Material):
     kernel: ClassVar[str] = "dielectric"
     parts: ClassVar[tuple[str, ...]] = ("ROUGH_DIELECTRIC", "DIELECTRIC_ENERGY", "DISPERSION")
     color: Albedo | Texture = (1.0, 1.0, 1.0)
-    ior: Annotated[float, Ge(0.25), Le(4)] = 1.5
+    ior: Annotated[float, Ge(1 / MOST_IOR), Le(MOST_IOR)] = 1.5
     roughness: Unit | Texture = 0.0
     multiple_scattering: bool = True
     thin: bool = False

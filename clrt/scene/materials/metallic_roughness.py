@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
 from ..fields.limits import Ge, Le
 from . import anisotropy_energy, layer_energy
-from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
+from .material import ALPHA_MIN, MOST_IOR, Albedo, Material, Parameter, Radiance, Unit
 from .presets import F0_PRESETS, Preset
 from .textures import WHITE, NonNegative, Texture
 
@@ -78,7 +78,7 @@ class MetallicRoughness(Material):
     smith: Smith = "height_correlated"
     coupling: Coupling | None = None
     multiple_scattering: bool | None = None
-    ior: Annotated[float, Ge(1), Le(4)] = 1.5
+    ior: Annotated[float, Ge(1), Le(MOST_IOR)] = 1.5
     specular: Unit | Texture = 1.0
     specular_color: Radiance | Texture = (1.0, 1.0, 1.0)
     clearcoat: Unit | Texture = 0.0
@@ -93,7 +93,7 @@ class MetallicRoughness(Material):
     diffuse_transmission: Unit | Texture = 0.0
     diffuse_transmission_color: Albedo | Texture = (1.0, 1.0, 1.0)
     iridescence: Unit | Texture = 0.0
-    iridescence_ior: Annotated[float, Ge(1), Le(4)] = 1.3
+    iridescence_ior: Annotated[float, Ge(1), Le(MOST_IOR)] = 1.3
     iridescence_thickness: NonNegative = 400.0
     iridescence_thickness_minimum: NonNegative = 100.0
     iridescence_thickness_map: Unit | Texture = 1.0

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from ....scene.geometry.instancing import meshes_by_id
 from ....scene.materials.material_types import Material
-from ....scene.model import Mesh, Scene
+from ....scene.model import Scene
 
 #: An opacity that is compiled as one below 1.
 BELOW_ONE = 1 - 2.0**-24
@@ -18,7 +18,7 @@ def with_vertex_alpha(scene: Scene) -> Scene:
     They would be compiled as opaque. Meshes and materials that are shared stay so.
     """
     meshes = meshes_by_id(scene.instances) | {id(mesh): mesh for mesh in scene.meshes}
-    clear = {number for number, mesh in meshes.items() if _has_alpha(mesh)}
+    clear = {number for number, mesh in meshes.items() if mesh.has_alpha}
     if not clear:
         return scene
     materials = dict[int, Material]()
@@ -38,7 +38,3 @@ def with_vertex_alpha(scene: Scene) -> Scene:
         for each in scene.instances
     ]
     return replace(scene, meshes=[meshes[id(mesh)] for mesh in scene.meshes], instances=instances)
-
-
-def _has_alpha(mesh: Mesh) -> bool:
-    return mesh.colors is not None and mesh.colors.shape[1] == 4 and bool((mesh.colors[:, 3] < 1).any())
