@@ -8,6 +8,7 @@ from typing import NamedTuple, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import UsageError
 from .file_names import StrPath
 from .float_errors import with_default_errors
 from .formats.load_scene import load as _load
@@ -57,6 +58,8 @@ def load(
 
     Raises SceneError, which lists all problems.
     """
+    if not isinstance(ignore_extensions, Iterable):
+        raise UsageError(f"ignore_extensions {ignore_extensions!r} is not a list of names")
     given = (ignore_extensions,) if isinstance(ignore_extensions, str) else tuple(ignore_extensions)
     choice = ModelChoice(
         scene=scene,

@@ -45,7 +45,8 @@ WRONG: tuple[Any, ...] = (
     1j,
     np.float32(3),
 )
-SCENE = clrt.load(Path(__file__).parents[1] / "scenes" / "cornell.toml")
+SCENES = Path(__file__).parents[1] / "scenes"
+SCENE = clrt.load(SCENES / "cornell.toml")
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Renderer": (clrt.Renderer, {"scene": SCENE, "size": (4, 4), "spp": 1}),
     "RayQuery": (clrt.RayQuery, {"vertices": np.eye(3), "faces": [[0, 1, 2]]}),
@@ -53,7 +54,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         clrt.InstancedRayQuery,
         {"meshes": [(np.eye(3), [[0, 1, 2]])], "mesh": [0], "transforms": np.eye(3, 4)[None]},
     ),
-    "load": (clrt.load, {"path": "nothing.toml"}),
+    "load": (clrt.load, {"path": SCENES / "models" / "spot.obj"}),
 }
 #: Arguments that are files or callbacks, not values to choose from.
 OTHER = {"on_phase", "before", "checkpoint", "resume"}

@@ -9,8 +9,9 @@ from dataclasses import replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import get_args
 
-from ..errors import SceneError, UsageError
+from ..errors import SceneError, UsageError, check_choice
 from ..file_names import StrPath
 from ..scene.axes_and_units import CONVERTED, Axis, Unit
 from ..scene.default_sky import SUN, default_sky
@@ -54,6 +55,12 @@ def load(
     """
     if not isinstance(path, (str, PathLike)):
         raise SceneError(f'{path!r} is not the path of a scene; give a file name, such as "scene.toml"')
+    for name, value, known in (("up", up, Axis), ("unit", unit, Unit)):
+        check_choice(name, value, (None, *get_args(known)))
+    if not isinstance(camera, str | None):
+        raise UsageError(f"camera {camera!r} is not a name")
+    if not isinstance(approximate, bool):
+        raise UsageError(f"approximate {approximate!r} is not a boolean")
     path = Path(path)
     check_scene(path)
     reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower())

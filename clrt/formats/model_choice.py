@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from math import isfinite
-from typing import get_args
 
 from ..errors import SceneError, UsageError
 from ..scene.axes_and_units import LightUnit
-from ..scene.validation.field_types import show
+from ..scene.validation.field_types import field_problems, show
 
 Named = str | int
 
@@ -34,11 +32,10 @@ class ModelChoice:
     ignore_extensions: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        """Raise UsageError for a time that is not a finite number, and for an unknown unit."""
-        if self.light_unit not in (None, *get_args(LightUnit)):
-            raise UsageError(f"light_unit is {self.light_unit!r}; give one of {', '.join(get_args(LightUnit))}")
-        if self.time is not None and not (isinstance(self.time, int | float) and isfinite(self.time)):
-            raise UsageError(f"time is {self.time!r}; give seconds")
+        """Raise UsageError for values of other types, and for an unknown unit."""
+        problems = field_problems(ModelChoice, vars(self), "load")
+        if problems:
+            raise UsageError("\n".join(problems))
 
     @property
     def animated(self) -> bool:

@@ -31,18 +31,18 @@
 #include IRIDESCENCE_FILE
 
 #if ANISOTROPY
-#define STRETCHED(m, w) stretched_by(&m->anisotropy, w)
-#define SQUEEZED(m, h) squeezed_by(&m->anisotropy, h)
-#define WIDEST_ALPHA(m) m->anisotropy.alpha_t
+#define STRETCHED(m, w) stretched_by(&(m)->anisotropy, w)
+#define SQUEEZED(m, h) squeezed_by(&(m)->anisotropy, h)
+#define WIDEST_ALPHA(m) (m)->anisotropy.alpha_t
 #else
 #define STRETCHED(m, w) w
 #define SQUEEZED(m, h) h
-#define WIDEST_ALPHA(m) m->alpha
+#define WIDEST_ALPHA(m) (m)->alpha
 #endif
 #if ANISOTROPY_ALBEDO
-#define BOUNCE_AT(m, w) bounce_at(&m->anisotropy, &m->bounces, w)
+#define BOUNCE_AT(m, w) bounce_at(&(m)->anisotropy, &(m)->bounces, w)
 #else
-#define BOUNCE_AT(m, w) ggx_bounce(&m->bounces, w.z)
+#define BOUNCE_AT(m, w) ggx_bounce(&(m)->bounces, (w).z)
 #endif
 
 #if LAYERS
@@ -361,11 +361,7 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     real3 kept = sub(splat(ONE), scale(f, lost));
     real part = PARAMETER(metallic_roughness, multiple) * (BY_ALBEDO(&m) ? metallic : ONE) * (1.0f - lost);
     m.multiple = scale(vector(f.x * f.x / kept.x, f.y * f.y / kept.y, f.z * f.z / kept.z), part);
-#if ANISOTROPY
-    m.spread = log(1.0f + 1.0f / square(m.anisotropy.alpha_t));
-#else
-    m.spread = log(1.0f + 1.0f / square(m.alpha));
-#endif
+    m.spread = log(1.0f + 1.0f / square(WIDEST_ALPHA(&m)));
 #endif
     real cos_o = maximum(surface->cos_o, ZERO);
     real3 fresnel_o = base_fresnel(&m, cos_o);

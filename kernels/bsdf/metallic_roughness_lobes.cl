@@ -55,11 +55,7 @@ static inline real3 BASE(albedo)(const struct metallic_roughness *m) {
     real3 in = sub(splat(ONE), m->f0);
     real3 albedo = mad3(mul(mul(in, in), m->albedo), (real)(20.0f / 21.0f), m->f0);
 #if COUPLING_ALBEDO
-#if ANISOTROPY_ALBEDO
-    Bounce straight = bounce_at(&m->anisotropy, &m->bounces, vector(ZERO, ZERO, ONE));
-#else
-    Bounce straight = ggx_bounce(&m->bounces, ONE);
-#endif
+    Bounce straight = BOUNCE_AT(m, vector(ZERO, ZERO, ONE));
 #if IRIDESCENCE
     real3 coupled = add(scale(base_fresnel(m, ONE), 1.0f - straight.lost), left_albedo(m, straight));
 #else

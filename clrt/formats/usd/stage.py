@@ -87,11 +87,12 @@ class _Content:
     content that they are part of, whose shapes and materials are shared."""
 
     def __init__(self, code: Any, outer: _Content | None = None) -> None:
-        self._code, self._depth = code, 0 if outer is None else outer._depth + 1
+        self._code = code
+        self._depth: int = outer._depth + 1 if outer else 0
         self.arrays: dict[str, Array] = outer.arrays if outer else {}
         self.ignored: Counter[str] = outer.ignored if outer else Counter()
-        self.materials = outer.materials if outer else Materials(code, self.arrays, self.ignored)
-        self.shapes = outer.shapes if outer else Shapes(code, self.arrays, self.materials, self.ignored)
+        self.materials: Materials = outer.materials if outer else Materials(code, self.arrays, self.ignored)
+        self.shapes: Shapes = outer.shapes if outer else Shapes(code, self.arrays, self.materials, self.ignored)
         self.lights: list[dict[str, Any]] = []
         self.cameras: list[dict[str, Any]] = []
         self._numbers: list[Array] = [np.zeros(0, np.int64)]

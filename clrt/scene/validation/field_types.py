@@ -9,7 +9,7 @@ import math
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -99,7 +99,8 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
     if origin is Annotated:
         yield from _problems(parts[0], value, path) if _fault(parts[0], value) else _outside(parts[1:], value, path)
     elif NoneType in parts:
-        yield from () if value is None else _problems(parts[0], value, path)
+        rest = tuple(part for part in parts if part is not NoneType)
+        yield from () if value is None else _problems(reduce(operator.or_, rest), value, path)
     elif origin in (Union, UnionType):
         yield from _problems(_meant(parts, value), value, path)
         if isinstance(value, Texture):
