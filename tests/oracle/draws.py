@@ -108,6 +108,8 @@ def _dielectric(draws: Draws) -> dict[str, Any]:
     inside = draws.one_of(("clear", "thin", "absorbing"))
     if inside == "absorbing":
         given |= {"attenuation_color": draws.vector(0.1, 0.9), "attenuation_distance": draws.between(0.2, 2.0)}
+    if given["roughness"] == 0.0 and inside != "thin" and draws.chance(0.3):
+        given |= {"dispersion": draws.between(0.5, 10.0)}
     return given | {"thin": inside == "thin"}
 
 
@@ -132,6 +134,8 @@ def _metallic_roughness(draws: Draws) -> dict[str, Any]:
     coupling = draws.one_of((None, *get_args(Coupling)))
     # The oracle supports multiple scattering of metals only with the albedo coupling.
     given |= {"coupling": coupling, "multiple_scattering": None if coupling in (None, "albedo") else False}
+    if MetallicRoughness(**given).coupled_by == "albedo" and draws.chance(0.3):
+        given |= {"diffuse_transmission": draws.number(0.0), "diffuse_transmission_color": draws.color()}
     return given | {"preset": draws.one_of(F0_PRESETS) if draws.chance(0.2) else None}
 
 

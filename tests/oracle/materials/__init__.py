@@ -18,8 +18,8 @@ from clrt.scene.materials.material_types import (
 
 from ..surface import Surface
 from .conductor import Metal
-from .dielectric import Glass
 from .diffuse import Lambertian
+from .dispersion import glass
 from .metallic_roughness import CookTorrance
 from .mirror import Specular
 from .phong import BlinnGloss, PhongGloss
@@ -29,7 +29,7 @@ SCATTERINGS: dict[type[Material], Callable[[Any, Surface], Scattering]] = {
     Diffuse: Lambertian,
     MetallicRoughness: CookTorrance,
     Mirror: Specular,
-    Dielectric: Glass,
+    Dielectric: glass,
     Conductor: Metal,
     Phong: PhongGloss,
     BlinnPhong: BlinnGloss,

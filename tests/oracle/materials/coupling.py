@@ -74,10 +74,13 @@ class ByAlbedo:
         """Return the lost energy (n, 1) at cosines (n,)."""
         return np.asarray(1 - sum(self._albedos.at(cosine)))
 
+    def entering(self, cosine: Doubles) -> Doubles:
+        """Return 1 − E (n, 3) at cosines (n,)."""
+        return np.asarray(1 - self._substance.dielectric.reflected(self._albedos.at(cosine)))
+
     def reflected(self, cosine: Doubles) -> Doubles:
         """Return R (n, 3) at cosines (n,)."""
-        inside = 1 - self._substance.dielectric.reflected(self._albedos.at(cosine))
-        r = self._substance.body * inside + self._multiple * self.lost(cosine)
+        r = self._substance.body * self.entering(cosine) + self._multiple * self.lost(cosine)
         return np.asarray(self._layers.left(cosine)[:, None] * r + self._given_back(cosine))
 
     def _given_back(self, cosine: Doubles) -> Doubles | float:

@@ -1,4 +1,4 @@
-"""Parameters of metallic_roughness at hits, with KHR_materials_ior, _specular, and _transmission."""
+"""Parameters of metallic_roughness at hits, with KHR_materials_ior, _specular, and both transmissions."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ class Fresnel:
 
 
 class Substance:
-    """dielectric, gloss: F of the dielectric part, and mixed with the metal; body, passing: (n, 3) color of light that
-    enters, diffuse or transmitted; color (n, 3); metallic (n, 1)."""
+    """dielectric, gloss: F of the dielectric part, and mixed with the metal; body, passing, leaf: (n, 3) color of light
+    that enters and is reflected diffusely, transmitted by microfacets, or diffusely; color (n, 3); metallic (n, 1)."""
 
     def __init__(self, material: MetallicRoughness, at: Surface) -> None:
         self.alpha, self.smith = alpha_of(at.number(material.roughness)), material.smith
@@ -54,4 +54,8 @@ class Substance:
             plastic + self.metallic * (self.color - plastic), specular + self.metallic * (1 - specular)
         )
         through = at.number(material.transmission)[:, None]
-        self.body, self.passing = ((1 - self.metallic) * self.color * part for part in (1 - through, through))
+        body, self.passing = ((1 - self.metallic) * self.color * part for part in (1 - through, through))
+        scattered = at.number(material.diffuse_transmission)[:, None]
+        tint = at.color(material.diffuse_transmission_color)
+        self.leaf = (1 - self.metallic) * (1 - through) * scattered * tint
+        self.body = body * (1 - scattered)
