@@ -85,7 +85,7 @@ def test_misspelled_axes_and_units(tmp_path: Path) -> None:
     assert 'mesh[0].up: "w"' in up and 'mesh[0].unit: "mmm"' in unit
     with pytest.raises(UsageError, match=r'a.toml: up and unit are for model files; in a scene file, write up = "z"'):
         load(tmp_path / "a.toml", up="z")
-    with pytest.raises(UsageError, match="up is 'w'; give one of x, y, z"):
+    with pytest.raises(UsageError, match="up 'w' is unknown; choose from x, y, z"):
         load(tmp_path / "a.ply", up="w")  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="unit is 3; give one of m, cm, mm, in, ft"):
+    with pytest.raises(UsageError, match="unit 3 is unknown; choose from m, cm, mm, in, ft"):
         load(tmp_path / "a.ply", unit=3)  # type: ignore[arg-type]
