@@ -115,11 +115,11 @@ def _in_group(group: int, path: Path) -> Callable[..., os.stat_result]:
     ("name", "arguments"),
     [
         ("a.png", ("render", "ball.toml", "-o", "a.png")),
-        ("a.raw.exr", ("render", "ball.toml", "-o", "a.exr", "--denoise")),
-        ("a.depth.png", ("render", "ball.toml", "-o", "a.png", "--aov", "depth")),
         ("a.ck~", ("render", "ball.toml", "--checkpoint", "a.ck")),
         ("a.toml", ("convert", "a.obj", "a.toml")),
         *others(
+            ("a.raw.exr", ("render", "ball.toml", "-o", "a.exr", "--denoise")),
+            ("a.depth.png", ("render", "ball.toml", "-o", "a.png", "--aov", "depth")),
             ("a.json", ("render", "ball.toml", "--report", "a.json")),
             ("p.png", ("render", "ball.toml", "--plot", "p.png")),
             ("a.ck", ("render", "ball.toml", "--checkpoint", "a.ck")),

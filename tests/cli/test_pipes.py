@@ -17,6 +17,7 @@ from clrt.cli.pipes import FORMATS, ITS_NAMES, STDOUT, Pipe, pipe_at, split_pipe
 from clrt.errors import OutputError, UsageError
 from clrt.output.images import read_image
 
+from ..covering import others
 from .test_checkpoints import SCENE
 
 CLRT = f"{sys.executable} -P -m clrt"
@@ -69,11 +70,13 @@ def test_a_pipe_takes_one_image(folder: Path) -> None:
     ("form", "redirection"),
     [
         ("png", "-o - | cat > got"),
-        ("exr", "-o exr:- > got"),
-        ("hdr", "-o hdr:/dev/stdout >> got"),
         ("exr", "-o exr:fifo & cat fifo > got; wait $!"),
-        ("png", "-o >(cat > got); sleep 0.2"),
-        ("png", "-o /dev/fd/1 -o other.exr --report other.json --denoise --progress json > got"),
+        *others(
+            ("exr", "-o exr:- > got"),
+            ("hdr", "-o hdr:/dev/stdout >> got"),
+            ("png", "-o >(cat > got); sleep 0.2"),
+            ("png", "-o /dev/fd/1 -o other.exr --report other.json --denoise --progress json > got"),
+        ),
     ],
 )
 def test_images(folder: Path, form: str, redirection: str) -> None:

@@ -97,6 +97,7 @@ def values(scene: Scene) -> Iterator[tuple[str, Scene]]:
     yield "depth", replace(scene, render=replace(scene.render, max_depth=2, seed=3))
 
 
+@pytest.mark.programs
 def test_edits_of_values_build_nothing_and_show_what_a_render_shows(live: Live, device: Device) -> None:
     """Neither program nor BVH is rebuilt; edits follow each other, so each starts from the state left by the last."""
     first = check_as_rendered(live, device)

@@ -91,6 +91,7 @@ def test_the_raw_picture_is_kept(image: clrt.Image) -> None:
     assert image.raw is not None and image.raw.tobytes() == plain.pixels.tobytes()
 
 
+@pytest.mark.statistics
 def test_the_report_tells_the_bias(image: clrt.Image, converged: Floats) -> None:
     assert image.raw is not None
     told = image.report["denoise"]

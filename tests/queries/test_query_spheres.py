@@ -34,6 +34,7 @@ DIRECTIONS = (RNG.random((3000, 3)) - ORIGINS).astype(np.float32)
 RAYS = ORIGINS.astype(np.float64), DIRECTIONS.astype(np.float64)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(
     "mesh, sphere, ways",
     [(MESH, "robust", WAYS), *others((NO_MESH, "robust", WAYS[2:3]), (MESH, "textbook", WAYS[5:]))],

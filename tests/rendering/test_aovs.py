@@ -277,6 +277,7 @@ def test_samples_are_counted_where_they_went() -> None:
     assert int(counts.sum()) + image.report["nonfinite_samples"] == image.report["samples"]
 
 
+@pytest.mark.programs
 def test_only_what_is_asked_for_is_compiled() -> None:
     """The image's program has no code for AOVs, except for direct or indirect light."""
     plain, light = (compile_scene(everything(), Choices(direct_light=apart)) for apart in (False, True))

@@ -206,6 +206,7 @@ def test_other_settings_are_refused(device: Device, kept: Path, other: dict[str,
     assert named in str(refused.value) and str(kept) in str(refused.value) and "--resume" in str(refused.value)
 
 
+@pytest.mark.programs
 def test_a_film_with_or_without_direct_light_is_refused(device: Device, kept: Path, tmp_path: Path) -> None:
     """The message names the option that enables it."""
     with pytest.raises(CheckpointError, match=r"another render \(without --aov direct or indirect\)"):

@@ -28,6 +28,7 @@ def probe(device: Device) -> Probe:
     return Probe(device, Scene())
 
 
+@pytest.mark.statistics
 @pytest.mark.parametrize("before", [1 << 27, *others(0)])
 def test_means_hold_past_2_to_24_samples(probe: Probe, before: int) -> None:
     """Constants from 3e-38 to 1e30, two alternating values, and rare peaks: all to 1e-7; the requirement is 1e-6."""

@@ -100,6 +100,7 @@ def test_albedo_is_the_materials_own(device: Device) -> None:
             np.testing.assert_allclose(picture, np.broadcast_to(expected, picture.shape), rtol=1e-6, atol=1e-7)
 
 
+@pytest.mark.programs
 def test_what_is_clear_is_not_seen(device: Device) -> None:
     """A one-sided wall from behind and one of opacity 0 are not seen in front of another wall."""
     walls = [
@@ -143,6 +144,7 @@ def test_no_light_is_compiled_or_missed(
     assert not image.pixels.any() and not caplog.records and image.report["integrator"] == integrator
 
 
+@pytest.mark.programs
 def test_png_files_are_for_eyes_and_exr_files_for_numbers(device: Device, tmp_path: Path) -> None:
     """PNG shows normals as ½ + ½n and depth as nearest/depth, for any view. A miss is black."""
     camera = Camera(position=(0.0, 0.0, 3.0), fov_degrees=20)

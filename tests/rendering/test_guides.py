@@ -67,6 +67,7 @@ def everywhere(picture: Floats, expected: tuple[float, ...]) -> None:
     np.testing.assert_allclose(picture, np.broadcast_to(expected, picture.shape), rtol=1e-6, atol=1e-7)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("material, tolerance", FURNACE.items(), ids=range(len(FURNACE)))
 def test_albedo_is_what_a_furnace_shows(device: Device, material: Material, tolerance: float) -> None:
     """Seen head on under a white sky, an unoccluded surface is as bright as its albedo."""
@@ -119,6 +120,7 @@ def test_normals_face_the_camera(device: Device) -> None:
     everywhere(guides(device, Scene(meshes=[leaning], camera=INSIDE, render=FLAT))["normal"], (0.6, 0, 0.8))
 
 
+@pytest.mark.programs
 def test_sky_is_its_radiance_up_to_one_without_a_normal(device: Device) -> None:
     found = guides(device, Scene(environment=Environment(color=(2.0, 0.5, 0.25)), render=FLAT))
     everywhere(found["albedo"], (1.0, 0.5, 0.25))

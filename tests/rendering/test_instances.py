@@ -183,6 +183,7 @@ def test_lanes_and_layouts_agree(device: Device, layout: str, lanes: int, sphere
     assert (np.abs(picture - expected).max(axis=2) > (0 if lanes == 8 else 1e-5)).mean() <= (0 if lanes == 8 else 0.005)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("rest", ["spheres", *others("nothing")])
 def test_whatever_else_is_in_the_scene(device: Device, rest: str) -> None:
     scene = crowd("turned")

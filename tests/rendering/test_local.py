@@ -109,6 +109,7 @@ def test_shadows_are_hard_and_only_ambient_is_left(device: Device) -> None:
     assert len(levels) <= 4, "two levels, and the pixels that the edge crosses"
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("depth", [2, 4, 7])
 def test_mirrors_are_followed_to_the_depth(device: Device, depth: int) -> None:
     """Two mirrors face each other below an emissive lid; slanted rays count their reflections.
@@ -126,6 +127,7 @@ def test_mirrors_are_followed_to_the_depth(device: Device, depth: int) -> None:
     assert np.allclose(picture, 2 * 0.8**3 if depth >= 4 else 0, rtol=1e-5)
 
 
+@pytest.mark.programs
 def test_glass_is_followed_both_ways(device: Device) -> None:
     """A sheet over the ground: F of what is above, 1 − F of the ground; it blocks the point light."""
     glass = ground(Dielectric(ior=1.5, thin=True), 1.0)

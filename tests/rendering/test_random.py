@@ -29,6 +29,7 @@ def draw(device: Device) -> Draw:
     return draw_on(Probe(device, INDEPENDENT))
 
 
+@pytest.mark.statistics
 def test_numbers_are_uniform(draw: Draw) -> None:
     """Pairs fill the unit square along every index and past 2^31 and 2^32, as do 4-tuples, and every bit is even."""
     p_values = uniformity(draw, COUNT)

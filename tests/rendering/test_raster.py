@@ -261,6 +261,7 @@ def test_without_shadows_all_that_faces_a_light_is_lit(device: Device, integrato
         np.testing.assert_allclose(dark, np.multiply(red, sky), rtol=1e-5)
 
 
+@pytest.mark.programs
 def test_mirrors_end_with_the_depth(device: Device) -> None:
     """At depth 2 a mirror shows the sky and emitters; at higher depths, what it reflects."""
     mirror = quad([(-2, -2, -2), (2, -2, -2), (2, 2, -2), (-2, 2, -2)], Mirror(color=(0.5,) * 3))
@@ -287,6 +288,7 @@ def test_it_follows_a_camera_that_moves(device: Device) -> None:
     assert np.array_equal(running.film().mean, other.film().mean)
 
 
+@pytest.mark.programs
 def test_thousands_of_instances_are_numbered_right(device: Device) -> None:
     vertices, faces = icosphere(3)
     places = [

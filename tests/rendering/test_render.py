@@ -15,6 +15,7 @@ from clrt.scene.materials.material_types import Diffuse, Material, MetallicRough
 from clrt.scene.materials.metallic_roughness import Smith
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 
+from ..covering import covering
 from .ggx import albedo
 from .pictures import box, film, pixel_means, pixel_p_values, pixel_points, quad
 
@@ -117,8 +118,7 @@ def test_emissive_box(device: Device, depth: int) -> None:
     assert p.min() > sidak(FAMILY, p.size), (mean.mean(axis=0), expected)
 
 
-@pytest.mark.parametrize("roughness", [0.3, 0.6])
-@pytest.mark.parametrize("smith", ["height_correlated", "separable"])
+@covering("smith, roughness", ["height_correlated", "separable"], [0.3, 0.6])
 def test_microfacets_under_a_lamp(device: Device, roughness: float, smith: Smith) -> None:
     """GGX with F = 1 among emissive walls has its single-scattering albedo, with MIS of light and BSDF samples."""
     metal = MetallicRoughness(

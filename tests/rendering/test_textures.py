@@ -244,6 +244,7 @@ def test_normal_maps_on_spheres(device: Device) -> None:
     assert a.max() > 0.3 and np.abs(a - b).max() < 1e-5
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("cut", [False, True], ids=["painted", "cut out"])
 @pytest.mark.parametrize("lanes", [8, *others(1)])
 def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: Lanes, cut: bool) -> None:

@@ -102,7 +102,7 @@ def test_spheres_as_in_float64(device: Device, layout: str) -> None:
     assert (off / size).max() < 1e-6
 
 
-@pytest.mark.parametrize("kind", ["edges", "duplicates", "mixed"])
+@pytest.mark.parametrize("kind", ["edges", "duplicates", *others("mixed")])
 def test_ties_are_broken_alike(device: Device, kind: str) -> None:
     """Layouts and builders find the same primitive at the same t; among equal ones the first."""
     if kind == "edges":

@@ -206,6 +206,7 @@ def test_lanes_agree_with_every_sampler(device: Device, sampler: Sampler, lanes:
     assert np.mean(np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)) < 1e-3
 
 
+@pytest.mark.programs
 def test_pictures_do_not_depend_on_passes_and_launches(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bit for bit: eight samples in one pass or several, in one launch or many, and the same twice."""
     scene = replace(everything(), render=RenderSettings(size=(64, 48), spp=8, seed=2))
