@@ -65,6 +65,18 @@ RGB_FROM_XYZ = np.array(
 FINE = np.linspace(SHORTEST, LONGEST, 4701)
 
 
+#: Planck's constant in J·s, the speed of light in m/s, Boltzmann's constant in J/K; and an exponent with a finite exp.
+H, C, BOLTZMANN, LARGEST_EXPONENT = 6.62607015e-34, 299792458.0, 1.380649e-23, 700.0
+
+
+def black_body(kelvin: float) -> tuple[list[float], list[float]]:
+    """Return wavelengths in nm, and the radiance of a black body at these in W·m⁻²·sr⁻¹·nm⁻¹ (Planck's law)."""
+    nm = np.arange(SHORTEST, LONGEST + 1)
+    exponent = np.minimum(H * C / (nm * 1e-9 * BOLTZMANN * kelvin), LARGEST_EXPONENT)
+    radiance = 2e-9 * H * C**2 / (nm * 1e-9) ** 5 / np.expm1(exponent)
+    return nm.tolist(), radiance.tolist()
+
+
 def rgb_of_spectrum(wavelengths: Sequence[float], values: Sequence[float], *, lit: bool) -> tuple[float, float, float]:
     """Return linear Rec. 709 of a spectrum given at increasing wavelengths in nm, interpolated linearly and 0 outside.
     Negative components are clamped to 0.

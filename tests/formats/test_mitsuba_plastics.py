@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from clrt.formats.mitsuba.plastics import coat
+from clrt.formats.scene_parts.coats import coat
 from clrt.output.images import write_image
 from clrt.scene.materials.material_types import MetallicRoughness
 from clrt.scene.materials.microfacets import albedos

@@ -15,9 +15,10 @@ from clrt.formats.load_scene import load
 from clrt.formats.mitsuba.environment_map import rows_at_middles
 from clrt.formats.mitsuba.primitives import cube, cylinder, disk, rectangle, sphere
 from clrt.formats.mitsuba.reader import MitsubaScene, read_mitsuba
-from clrt.formats.mitsuba.textures import _pair
 from clrt.formats.mitsuba.values import transform
-from clrt.formats.mitsuba.xml import UnsupportedError, read_xml
+from clrt.formats.mitsuba.xml import read_xml
+from clrt.formats.scene_parts.notes import UnsupportedError
+from clrt.formats.scene_parts.texture_images import pair_of_texels
 from clrt.scene.materials.material_types import Conductor, Dielectric, Diffuse, Mirror
 from clrt.scene.materials.textures import Texture
 from clrt.scene.model import Mesh, Scene
@@ -189,7 +190,7 @@ def test_a_blend_of_two_colors(folder: Path) -> None:
 @given(st.floats(0, 1), st.floats(0, 1), st.booleans())
 def test_checkerboards_keep_both_colors(first: float, second: float, encoded: bool) -> None:
     """The brighter one to rounding, the other to half a step of 8 bits; those of the test scenes to 1e-4."""
-    one, other, factor = _pair(first, second, encoded)
+    one, other, factor = pair_of_texels(first, second, encoded)
     texels = np.array([one, other], np.float32) / np.float32(255)
     values = linear_from_srgb(texels) if encoded else texels
     assert 0 <= factor <= 1 and 0 <= min(one, other) and max(one, other) <= 255
@@ -199,7 +200,7 @@ def test_checkerboards_keep_both_colors(first: float, second: float, encoded: bo
 
 @pytest.mark.parametrize(("first", "second"), [(0.4, 0.2), (0.8, 0.1), (0.2, 0.4), (0.0, 0.3)])
 def test_common_checkerboards_are_exact(first: float, second: float) -> None:
-    one, other, factor = _pair(first, second, True)
+    one, other, factor = pair_of_texels(first, second, True)
     values = linear_from_srgb(np.array([one, other], np.float32) / np.float32(255)) * factor
     np.testing.assert_allclose(values, [first, second], atol=1e-4)
 

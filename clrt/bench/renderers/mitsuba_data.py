@@ -21,7 +21,7 @@ from ...device.discovery.discover import choose
 from ...errors import SceneError, UsageError
 from ...formats.images.image_reader import read_picture
 from ...formats.mitsuba.reader import MitsubaScene, read_mitsuba
-from ...formats.mitsuba.xml import UnsupportedError
+from ...formats.scene_parts.notes import UnsupportedError
 from ...scene.materials.material_types import Diffuse
 from ...scene.model import Mesh, Sphere
 from ...scene.spectra import RGB_FROM_XYZ

@@ -13,8 +13,8 @@ import numpy as np
 from ...errors import SceneError
 from ...scene.materials.material_types import Conductor, Dielectric, Diffuse, Material, Mirror
 from ...scene.materials.textures import Texture
+from ..scene_parts.refractive_indices import DIELECTRICS, METALS, Triple
 from .materials import WHITE, MaterialReader, ShapeMaterial
-from .refractive_indices import DIELECTRICS, METALS, Triple
 from .textures import Attribute
 from .values import rgb
 from .xml import Plugin

@@ -9,14 +9,12 @@ import numpy as np
 
 from ...errors import SceneError
 from ...scene.model import Camera
-from .notes import Notes
-from .values import Doubles
+from ..scene_parts.camera_axes import lengths_of
+from ..scene_parts.notes import Notes
 from .xml import Plugin
 
 #: Default of Mitsuba's camera, and the diagonal in mm of the film that focal_length refers to.
 FOCAL_LENGTH, DIAGONAL = "50mm", hypot(36, 24)
-#: Tolerance for a camera's axes to be orthogonal and equally long.
-ODD = 1e-4
 #: Ignored parameters.
 CLIPPED = {"near_clip", "far_clip"}
 
@@ -28,7 +26,15 @@ def camera_of(plugin: Plugin, size: tuple[int, int], notes: Notes) -> Camera:
     plugin.used |= CLIPPED
     to_world, aspect = plugin.transform("to_world"), size[0] / size[1]
     position, forward, up = (to_world[:3, column] for column in (3, 2, 1))
-    lengths = _lengths(plugin, to_world, notes)
+    lengths = lengths_of(plugin, to_world[:3, :3], "its to_world")
+    if np.linalg.det(to_world[:3, :3]) < 0:
+        notes.instead(
+            plugin,
+            "its to_world mirrors the image",
+            "only rotate, translate and scale",
+            "the image is not mirrored",
+            "sensor that mirrors",
+        )
     distance = plugin.value("focus_distance", float, 1.0)
     seen = position + distance * forward / lengths[2]
     camera = Camera(position=position.tolist(), look_at=seen.tolist(), up=up.tolist())
@@ -41,31 +47,6 @@ def camera_of(plugin: Plugin, size: tuple[int, int], notes: Notes) -> Camera:
         aperture_radius=radius,
         focus_distance=distance if radius else None,
     )
-
-
-def _lengths(plugin: Plugin, to_world: Doubles, notes: Notes) -> tuple[float, float, float]:
-    """Return the lengths of a sensor's axes; these must be orthogonal and not stretch the image."""
-    axes = to_world[:3, :3]
-    x, y, z = np.linalg.norm(axes, axis=0).tolist()
-    if (
-        min(x, y, z) == 0
-        or np.abs((axes / (x, y, z)).T @ (axes / (x, y, z)) - np.eye(3)).max() > ODD
-        or (abs(x - y) > ODD * x)
-    ):
-        plugin.refuse(
-            "its to_world shears or stretches the image",
-            "only rotate, translate and scale uniformly",
-            "sensor that shears or stretches",
-        )
-    if np.linalg.det(axes) < 0:
-        notes.instead(
-            plugin,
-            "its to_world mirrors the image",
-            "only rotate, translate and scale",
-            "the image is not mirrored",
-            "sensor that mirrors",
-        )
-    return x, y, z
 
 
 def _vertical_fov(plugin: Plugin, aspect: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from ...scene.model import Environment, FloatArray
 from ..images.image_reader import read_picture
 from ..images.turned_environment import TURN, interpolated, resampled, turned_about_y
-from .notes import Notes
+from ..scene_parts.notes import Notes
 from .values import Doubles
 from .xml import Plugin
 

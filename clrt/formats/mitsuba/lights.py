@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ...scene.model import Environment
+from ..scene_parts.notes import Notes
 from .environment_map import environment_map
-from .notes import Notes
 from .values import rgb
 from .xml import Plugin
 

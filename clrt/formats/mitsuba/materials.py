@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from ...errors import SceneError
 from ...scene.materials.material_types import Material
 from ...scene.materials.textures import Texture
-from .notes import Notes
+from ..scene_parts.notes import Notes
 from .textures import Attribute, TextureReader
 from .values import rgb
 from .xml import Plugin

@@ -13,16 +13,16 @@ from ...scene.materials.material import Material
 from ...scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from ...scene.render_settings import Filter, Integrator
 from ..referenced_files import name_of
+from ..scene_parts.notes import Notes, UnsupportedError
 from .bsdf_types import TYPES
 from .camera import camera_of
 from .lights import ENVIRONMENTS, OF_SHAPES, environment, light
 from .materials import MaterialReader
-from .notes import Notes
 from .shapes import ShapeReader
 from .stand_ins import unknown
 from .sun_and_sky import KINDS as SUN_AND_SKY, sun_and_sky
 from .textures import TextureReader
-from .xml import Plugin, UnsupportedError, read_xml
+from .xml import Plugin, read_xml
 
 Part = TypeVar("Part")
 

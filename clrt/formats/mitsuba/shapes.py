@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,20 +13,18 @@ from ...scene.geometry.normals import smooth_normals
 from ...scene.geometry.transform import transform_mesh, unit
 from ...scene.materials.material import Material
 from ...scene.materials.material_types import Diffuse
-from ...scene.model import FloatArray, Instance, Mesh, Sphere
-from ...scene.validation.validate import index_problems
+from ...scene.model import Instance, Mesh, Sphere
 from ..models import read_model
-from ..ply.attributes import columns_of, coordinates_of
-from ..ply.elements import Columns, read_elements
-from ..ply.triangles import Triangles, faces_of
+from ..ply.mesh_attributes import Attributes, mesh_with_attributes
+from ..scene_parts.notes import Notes, UnsupportedError
+from ..scene_parts.spheres import inside_out, sphere_at
 from .bsdfs import absorbing
 from .materials import MaterialReader, ShapeMaterial
-from .notes import Notes
 from .primitives import cube, cylinder, disk, rectangle, sphere
 from .serialized import read_serialized
 from .textures import Attribute, TextureReader
 from .values import Doubles
-from .xml import Plugin, UnsupportedError
+from .xml import Plugin
 
 PRIMITIVES: dict[str, Callable[[], Mesh]] = {
     "rectangle": rectangle,
@@ -36,12 +34,9 @@ PRIMITIVES: dict[str, Callable[[], Mesh]] = {
     "sphere": sphere,
 }
 FILES = ("obj", "ply", "serialized")
-#: Tolerance for a transform to be a rotation, translation and uniform scale.
-UNEVEN = 1e-5
 #: Maximum number of spheres and disks that become triangles, of 2 MB each.
 MOST_ROUND = 256
 Part = Mesh | Sphere
-Attributes = Mapping[str, FloatArray]
 
 
 class ShapeReader:
@@ -86,7 +81,7 @@ class ShapeReader:
             to_world = to_world @ _ball(plugin)
             flips ^= mirrored
             inwards = flips and (any(look.material.radiance) or "TRANSMISSION" in look.material.features())
-            if not inwards and (ball := _sphere(to_world, look, plugin.where)):
+            if not inwards and (ball := sphere_at(to_world, look.material, plugin.where)):
                 yield ball
                 return
         elif plugin.kind == "cylinder":
@@ -99,7 +94,7 @@ class ShapeReader:
         else:
             pieces = list(_from_file(plugin, mirrored))
         for mesh, attributes in pieces:
-            placed = transform_mesh(_turned(mesh) if flips else mesh, to_world)
+            placed = transform_mesh(inside_out(mesh) if flips else mesh, to_world)
             yield _dressed(placed, look, attributes, plugin)
 
     def _look(self, plugin: Plugin) -> ShapeMaterial:
@@ -161,7 +156,7 @@ class ShapeReader:
             place = np.eye(4)
             place[:3, :3] *= part.radius
             place[:3, 3] = part.center
-            moved = _sphere(to_world @ place, ShapeMaterial(part.material), plugin.where)
+            moved = sphere_at(to_world @ place, part.material, plugin.where)
             if moved is None:
                 plugin.refuse("stretches a sphere", "scale uniformly", "stretched sphere")
             yield moved
@@ -200,24 +195,6 @@ def _between(plugin: Plugin) -> Doubles:
     return frame @ np.diag([radius, radius, float(np.linalg.norm(along)), 1.0])
 
 
-def _sphere(to_world: Doubles, look: ShapeMaterial, name: str) -> Sphere | None:
-    """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or if it is textured."""
-    linear = to_world[:3, :3]
-    squares = linear.T @ linear
-    radius = float(np.cbrt(abs(np.linalg.det(linear))))
-    if look.material.textures() or np.abs(squares - radius**2 * np.eye(3)).max() > UNEVEN * radius**2:
-        return None
-    x, y, z = to_world[:3, 3].tolist()
-    return Sphere(center=(x, y, z), radius=radius, material=look.material, name=name)
-
-
-def _turned(mesh: Mesh) -> Mesh:
-    """Return the mesh turned inside out."""
-    return replace(
-        mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]), normals=None if mesh.normals is None else -mesh.normals
-    )
-
-
 def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attributes]]:
     """Yield the meshes of a file, with smooth normals if it has none, as in Mitsuba.
 
@@ -226,7 +203,7 @@ def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attribute
     path = Path(plugin.value("filename", str, ""))
     flat = plugin.value("face_normals", bool, False)
     downward = plugin.value("flip_tex_coords", bool, plugin.kind == "obj")
-    own = _ply(path) if plugin.kind == "ply" else None
+    own = mesh_with_attributes(path) if plugin.kind == "ply" else None
     if plugin.kind == "serialized":
         mesh, flat_itself = read_serialized(path, plugin.value("shape_index", int, 0))
         own, flat = (mesh, {}), flat or flat_itself
@@ -237,45 +214,10 @@ def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attribute
         if flat:
             mesh.normals = None
         if mirrored and mesh.normals is None:
-            mesh = _turned(mesh)
+            mesh = inside_out(mesh)
         if not flat and mesh.normals is None:
             mesh.normals = smooth_normals(mesh.vertices, mesh.faces)
         yield mesh, attributes
-
-
-def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
-    """Read a PLY file of faces with all its attributes; None for others."""
-    try:
-        _, elements = read_elements(path.read_bytes(), ("vertex", "face"))
-    except SceneError as error:
-        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
-    vertex, found = elements.get("vertex"), faces_of(elements)
-    points = None if vertex is None else columns_of(vertex, ("x", "y", "z"))
-    if vertex is None or found is None or points is None:
-        return None
-    face, triangles = found[0], Triangles(found[1], points)
-    if problems := index_problems(triangles.vertices, vertex.number, f'mesh "{path.stem}"'):
-        raise SceneError([f"{path}: {problem}" for problem in problems])
-    mesh = Mesh(points, triangles.vertices, name=path.stem)
-    normals, uv = columns_of(vertex, ("nx", "ny", "nz")), coordinates_of(vertex)
-    mesh.normals = None if normals is None else normals.astype(np.float32)
-    mesh.uv = None if uv is None else uv.astype(np.float32)
-    of_faces = {name: values[triangles.polygons] for name, values in _attributes(face).items()}
-    attributes = {f"vertex_{name}": values for name, values in _attributes(vertex).items()}
-    return mesh, attributes | {f"face_{name}": values for name, values in of_faces.items()}
-
-
-def _attributes(table: Columns) -> dict[str, FloatArray]:
-    """Collect columns color_0, color_1 … into arrays (n, k), by name."""
-    groups: dict[str, list[str]] = {}
-    for column in table.scalars:
-        name, _, place = column.rpartition("_")
-        if name and place.isdigit() or name and place in "rgb":
-            groups.setdefault(name, []).append(column)
-    return {
-        name: np.column_stack([table.scalars[column] for column in columns]).astype(np.float32)
-        for name, columns in groups.items()
-    }
 
 
 def _dressed(mesh: Mesh, look: ShapeMaterial, attributes: Attributes, plugin: Plugin) -> Mesh:

@@ -12,7 +12,7 @@ from ...scene.geometry.transform import unit
 from ...scene.lights import DirectionalLight
 from ...scene.model import Environment, FloatArray
 from ...scene.spectra import RGB_FROM_XYZ
-from .notes import Notes
+from ..scene_parts.notes import Notes
 from .values import Doubles
 from .xml import Plugin
 

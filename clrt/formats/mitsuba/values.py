@@ -10,16 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
-from ...scene.geometry.transform import scaling, translation, unit
-from ...scene.spectra import LONGEST, SHORTEST, rgb_of_spectrum
+from ...scene.geometry.transform import axis_rotation, looking_at, scaling, translation
+from ...scene.spectra import black_body, rgb_of_spectrum
 from .elements import Element
 
 Doubles = NDArray[np.float64]
 Attributes = Mapping[str, str]
 
 
-#: Planck's constant in J·s, the speed of light in m/s, Boltzmann's constant in J/K; and an exponent with a finite exp.
-H, C, BOLTZMANN, LARGEST_EXPONENT = 6.62607015e-34, 299792458.0, 1.380649e-23, 700.0
 #: Number of characters of a value in a message.
 SHOWN = 60
 HEXADECIMAL = re.compile("#" + "([0-9a-fA-F]{2})" * 3)
@@ -110,10 +108,7 @@ def blackbody(temperature: str, scale: str) -> Color:
     (kelvin,), (factor,) = numbers(temperature.strip().removesuffix("K")), numbers(scale)
     if not kelvin > 0:
         raise ValueError(temperature)
-    nm = np.arange(SHORTEST, LONGEST + 1)
-    exponent = np.minimum(H * C / (nm * 1e-9 * BOLTZMANN * kelvin), LARGEST_EXPONENT)
-    radiance = 2e-9 * H * C**2 / (nm * 1e-9) ** 5 / np.expm1(exponent)
-    red, green, blue = (factor * part for part in rgb_of_spectrum(nm.tolist(), radiance.tolist(), lit=False))
+    red, green, blue = (factor * part for part in rgb_of_spectrum(*black_body(kelvin), lit=False))
     return Color((red, green, blue))
 
 
@@ -137,26 +132,12 @@ def transform(steps: list[tuple[str, Attributes]]) -> Doubles:
 
 
 def _rotate(attributes: Attributes) -> Doubles:
-    """Return the rotation by `angle` degrees, counter-clockwise looking against the axis (Rodrigues)."""
-    x, y, z = unit(np.array(vector(attributes))).tolist()
-    angle = np.radians(numbers(attributes["angle"])[0])
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    matrix = np.eye(4)
-    matrix[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    return matrix
+    return axis_rotation(vector(attributes), numbers(attributes["angle"])[0])
 
 
 def _look_at(attributes: Attributes) -> Doubles:
-    """Return the matrix from camera axes, +z forward, +y up and +x left, to the world."""
     texts = attributes["origin"], attributes["target"], attributes.get("up", "0 1 0")
-    origin, target, up = (np.array(vector({"value": text})) for text in texts)
-    forward = unit(target - origin)
-    left = unit(np.cross(up, forward))
-    if not (forward.any() and left.any()):
-        raise ValueError("up")
-    matrix = np.eye(4)
-    matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, origin])
-    return matrix
+    return looking_at(*(vector({"value": text}) for text in texts))
 
 
 def _matrix(attributes: Attributes) -> Doubles:

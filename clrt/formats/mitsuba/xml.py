@@ -15,6 +15,7 @@ import numpy as np
 
 from ...errors import SceneError
 from ..referenced_files import check_file, find_file
+from ..scene_parts.notes import UnsupportedError
 from .dialect import is_old, modernize
 from .elements import DEEPEST, Element, ElementParser
 from .values import READERS, Color, Doubles, Spectrum, Value, value_of
@@ -41,14 +42,6 @@ PLUGINS = (
 INCLUDES, MOST_INCLUDES = 15, 1000
 #: Maximum number of characters that all uses of defaults may be replaced by.
 LONGEST = 10_000_000
-
-
-class UnsupportedError(SceneError):
-    """A scene uses unsupported features. `features`: their names, two or three words each."""
-
-    def __init__(self, problems: str | list[str], features: list[str]) -> None:
-        super().__init__(problems)
-        self.features = features
 
 
 @dataclass(eq=False)

@@ -45,6 +45,29 @@ def rotation(degrees: Vector) -> Matrix:
     return matrix
 
 
+def axis_rotation(axis: Vector, degrees: float) -> Matrix:
+    """Return the rotation about `axis`, of any length but zero, counter-clockwise looking against it (Rodrigues)."""
+    x, y, z = unit(np.array(axis)).tolist()
+    angle = np.radians(degrees)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    matrix = np.eye(4)
+    matrix[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return matrix
+
+
+def looking_at(origin: Vector, target: Vector, up: Vector) -> Matrix:
+    """Return the matrix from axes +z to `target`, +y up and +x along up × z to the world. Raises ValueError if there is
+    none."""
+    place = np.array(origin)
+    forward = unit(np.array(target) - place)
+    side = unit(np.cross(up, forward))
+    if not (forward.any() and side.any()):
+        raise ValueError("up")
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([side, np.cross(forward, side), forward, place])
+    return matrix
+
+
 def quaternion(x: float, y: float, z: float, w: float) -> Matrix:
     """Return the rotation of a quaternion (x, y, z, w) of any length but zero."""
     x, y, z, w = np.array([x, y, z, w]) / np.linalg.norm([x, y, z, w])

@@ -1,0 +1,1 @@
+"""What the readers of Mitsuba's and pbrt's scenes share."""
