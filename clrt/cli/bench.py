@@ -15,6 +15,7 @@ from .bench_hits import hits_command
 from .bench_mitsuba_data import mitsuba_data_command
 from .bench_numerics import numerics_command
 from .bench_peers import peers_command
+from .bench_poses import poses_command
 from .bench_rays import rays_command
 from .bench_render_fidelity import render_fidelity_command
 from .bench_theses import theses_command
@@ -23,7 +24,7 @@ from .command_group import CommandGroup
 
 @click.group(cls=CommandGroup)
 def command() -> None:
-    """Measure speed and accuracy: rays, build, hits, peers, converge, agree, combinations, floor, blender,
+    """Measure speed and accuracy: rays, build, hits, peers, converge, agree, combinations, floor, blender, poses,
     mitsuba-data, render-fidelity, numerics, theses, farm."""
 
 
@@ -37,6 +38,7 @@ for each in (
     combinations_command,
     floor_command,
     blender_command,
+    poses_command,
     mitsuba_data_command,
     render_fidelity_command,
     numerics_command,

@@ -243,7 +243,7 @@ def broken(where: str, value: Any) -> Gltf:
     elif where == "sampler":
         channel["sampler"] = value
     else:
-        sampler[where] = value if isinstance(value, str) else gltf.accessor(value)
+        sampler[where] = value if isinstance(value, str | int) else gltf.accessor(value)
     return gltf
 
 
@@ -251,6 +251,7 @@ def broken(where: str, value: Any) -> Gltf:
     ("where", "value", "words"),
     [
         ("interpolation", "CUBIC", 'its interpolation is "CUBIC"; write one of LINEAR, STEP, CUBICSPLINE'),
+        ("interpolation", 0, 'its interpolation is "0"; write one of LINEAR, STEP, CUBICSPLINE'),
         ("interpolation", "CUBICSPLINE", 'animation "walk", rotation of node 0: has 2 values for 2 times'),
         ("input", np.array([2.0, 1.0]), "its times do not ascend"),
         ("input", np.array([0.0, np.nan]), "its times do not ascend"),

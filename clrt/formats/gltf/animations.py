@@ -106,9 +106,10 @@ def animation_names(document: gltf.Document) -> list[str]:
 def _track(data: GltfData, node: int, path: str, sampler: gltf.AnimationSampler, user: str) -> Track:
     """Return the keyframes of a channel. Raises SceneError for times that do not ascend, other numbers of values, and
     values that are not finite."""
-    parts = PARTS.get(sampler.interpolation)
+    kind = str(sampler.interpolation)
+    parts = PARTS.get(kind)
     if parts is None:
-        raise SceneError(f'{user}: its interpolation is "{sampler.interpolation}"; write one of {", ".join(PARTS)}')
+        raise SceneError(f'{user}: its interpolation is "{kind}"; write one of {", ".join(PARTS)}')
     times = data.array(sampler.input, "SCALAR", user)[:, 0]
     values = data.array(sampler.output, PROPERTIES[path], user)
     if path in ("rotation", "weights"):
@@ -123,4 +124,4 @@ def _track(data: GltfData, node: int, path: str, sampler: gltf.AnimationSampler,
         raise SceneError(f"{user}: has a value that is not finite; export it again")
     if path == "rotation" and not values[:, parts // 2].any(axis=1).all():
         raise SceneError(f"{user}: has a rotation [0, 0, 0, 0]; write [0, 0, 0, 1] for none")
-    return Track(node, path, sampler.interpolation, times, values)
+    return Track(node, path, kind, times, values)

@@ -256,7 +256,7 @@ class AnimationChannel(Part):
 class AnimationSampler(Part):
     input: Index
     output: Index
-    interpolation: str = "LINEAR"
+    interpolation: str | int = "LINEAR"
 
 
 class Animation(Part):
