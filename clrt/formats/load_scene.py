@@ -17,13 +17,14 @@ from ..scene.axes_and_units import CONVERTED, Axis, Unit
 from ..scene.default_sky import SUN, default_sky
 from ..scene.geometry.transform import rotation, transform_light
 from ..scene.model import Instance, Mesh, Model, Scene
+from ..scene.model_pose import with_poses
 from ..scene.provenance import source_of_model
 from ..scene.validation.validate import scene_problems
 from .frame_model import VIEWS, frame
 from .model_choice import DEFAULT, ModelChoice
 from .models import SUFFIXES, read_model
 from .referenced_files import check_file, name_of
-from .toml.instance_table import placed_animation
+from .toml.instance_table import placed
 from .toml.mesh_table import MeshTable
 from .toml.reader import SceneReader, camera_problems
 from .up_axis import upright
@@ -105,7 +106,8 @@ def _load_model(
     placing = {"up": up or model.up, "unit": unit or model.unit}
     placing = {key: value for key, value in placing.items() if value != getattr(MeshTable, key)}
     if placing:
-        model = placed_animation(model, upright(up or model.up, unit or model.unit))
+        to_world = upright(up or model.up, unit or model.unit)
+        model = with_poses(model, partial(placed, matrix=to_world, material=None, others={}))
     if model.converted_from is not None:
         log.warning(
             "%s: %s; --light-unit radiometric takes them as W/sr and W/m²", path, CONVERTED[model.converted_from]

@@ -1,9 +1,9 @@
-"""Animation: of the camera, by keyframes or as a turntable, and of a model, as its file defines it."""
+"""Animation: of the camera, by keyframes or as a turntable, of a model, as its file defines it, and of both."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from .fields.limits import Gt, Lt
@@ -85,6 +85,31 @@ class ModelAnimation:
     def frames(self) -> int:
         """Return the number of frames, frame 0 at time 0; a frame that falls on the end is included."""
         return frame_count(self.seconds, self.fps)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SceneAnimation:
+    """Animation of a scene file with moving models. fps: frames per second; camera: its animation, if it has one, whose
+    fps is not used."""
+
+    models: tuple[ModelAnimation, ...]
+    camera: Animation | None = None
+    fps: Positive = 24.0
+
+    @property
+    def seconds(self) -> float:
+        """Return the duration of the camera's animation, else that of the longest model's."""
+        return max(model.seconds for model in self.models) if self.camera is None else self.camera.seconds
+
+    @property
+    def frames(self) -> int:
+        """Return the number of frames, as of the camera's animation."""
+        return frame_count(self.seconds, self.fps) if self.camera is None else replace(self.camera, fps=self.fps).frames
+
+    @property
+    def start(self) -> float:
+        """Return the time of frame 0, that of the first keyframe."""
+        return self.camera.keyframes[0].time if self.camera and self.camera.keyframes else 0.0
 
 
 def frame_count(seconds: float, fps: float) -> int:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import SceneError, UsageError
-from .animation import Animation, Keyframe, ModelAnimation
+from .animation import Animation, Keyframe, ModelAnimation, SceneAnimation
 from .model import Camera, Scene
 from .model_pose import posed
 from .splines import Doubles, smooth
@@ -20,7 +20,7 @@ MOST_FRAMES = 1_000_000
 
 
 def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
-    """Return the scene with the camera going once around in this number of frames.
+    """Return the scene with the camera going once around in this number of frames, while a scene file's models move.
 
     Raises UsageError unless `frames` is at least 1 and `fps` is above 0 and finite.
     """
@@ -28,20 +28,23 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
         raise UsageError(f"frames is {frames}; it must be at least 1")
     if not 0 < fps < np.inf:
         raise UsageError(f"fps is {fps}; it must be above 0 and finite")
-    return replace(scene, animation=Animation(fps=fps, turntable_seconds=frames / fps))
+    around = Animation(fps=fps, turntable_seconds=frames / fps)
+    if isinstance(scene.animation, SceneAnimation):
+        return replace(scene, animation=replace(scene.animation, camera=around, fps=fps))
+    return replace(scene, animation=around)
 
 
 def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
     """Return the number and the static scene of all frames, or of the `chosen` ones.
 
-    With keyframes and turntables the scenes differ in their camera alone. Raises SceneError if the scene has no
-    animation or an invalid one, UsageError for an invalid number.
+    If no model moves, the scenes differ in their camera alone. Raises SceneError if the scene has no animation or an
+    invalid one, UsageError for an invalid number.
     """
     animation = scene.animation
     if animation is None:
         raise SceneError(
-            f"{scene.name}: has no animation; write [[keyframe]] tables, or use a turntable (--turntable, "
-            "clrt.turntable)"
+            f"{scene.name}: has no animation; write [[keyframe]] tables or the animation of a [[mesh]], or use a "
+            "turntable (--turntable, clrt.turntable)"
         )
     if problems := _problems(scene.camera, animation):
         raise SceneError(problems)
@@ -51,18 +54,34 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
         if not 0 <= number < count:
             raise UsageError(f"{scene.name} has no frame {number}; its frames are 0 to {count - 1}")
     if isinstance(animation, ModelAnimation):
-        return ((number, posed(scene, animation, number / animation.fps)) for number in numbers)
+        animation = SceneAnimation(models=(animation,), fps=animation.fps)
+    if isinstance(animation, SceneAnimation):
+        return _moving_frames(scene, animation, numbers)
     cameras = _cameras(scene.camera, animation, np.array(numbers, np.float64))
     return ((number, replace(scene, camera=camera, animation=None)) for number, camera in zip(numbers, cameras))
 
 
-def _problems(camera: Camera, animation: Animation | ModelAnimation) -> list[str]:
-    if isinstance(animation, ModelAnimation):
+def _moving_frames(scene: Scene, animation: SceneAnimation, numbers: Sequence[int]) -> Iterator[tuple[int, Scene]]:
+    """Yield the frames of moving models. A camera without an animation moves if it is a model's."""
+    times = animation.start + np.array(numbers, np.float64) / animation.fps
+    path = None if animation.camera is None else replace(animation.camera, fps=animation.fps)
+    cameras = None if path is None else _cameras(scene.camera, path, np.array(numbers, np.float64))
+    for number, time in zip(numbers, times.tolist()):
+        still = scene
+        for model in animation.models:
+            still = posed(still, model, time)
+        yield number, still if cameras is None else replace(still, camera=next(cameras))
+
+
+def _problems(camera: Camera, animation: Animation | ModelAnimation | SceneAnimation) -> list[str]:
+    if isinstance(animation, SceneAnimation) and animation.camera is not None:
+        animation = replace(animation.camera, fps=animation.fps)
+    if not isinstance(animation, Animation):
         return field_problems(Animation, {"fps": animation.fps}, "animation") or _length_problems(animation)
     return field_problems(Animation, vars(animation), "animation") or animation_problems(camera, animation)
 
 
-def _length_problems(animation: Animation | ModelAnimation) -> list[str]:
+def _length_problems(animation: Animation | ModelAnimation | SceneAnimation) -> list[str]:
     """Return a problem if there are too many frames."""
     if animation.seconds * animation.fps < MOST_FRAMES:
         return []

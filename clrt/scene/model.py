@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ClrtError
-from .animation import Animation, ModelAnimation
+from .animation import Animation, ModelAnimation, SceneAnimation
 from .axes_and_units import Axis, LightUnit, Unit
 from .cameras import Camera as Camera
 from .fields.limits import Gt
@@ -182,7 +182,7 @@ class Scene:
     """Everything needed to render an image.
 
     - camera: the one to render; cameras: others by name, including those of model files.
-    - animation: how the camera, or a model, moves.
+    - animation: how the camera and models move.
     - materials: the scene file's named ones; meshes and spheres refer to these objects.
     - source: the files that its parts were read from, if any.
     """
@@ -196,6 +196,6 @@ class Scene:
     render: RenderSettings = field(default_factory=RenderSettings)
     name: str = "scene"
     cameras: dict[str, Camera] = field(default_factory=dict)
-    animation: Animation | ModelAnimation | None = None
+    animation: Animation | ModelAnimation | SceneAnimation | None = None
     materials: dict[str, Material] = field(default_factory=dict)
     source: Source | None = None

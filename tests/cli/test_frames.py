@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -100,6 +101,32 @@ def test_frames_of_an_animated_model(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert len(render(*small, "--frames", "all", "--fps", "2", "-o", "g_#.png")) == 5
     failed = CliRunner().invoke(command, [*small, "--frames", "all", "--animation-time", "1"])
     assert isinstance(failed.exception, clrt.UsageError) and "leave out --frames" in str(failed.exception)
+
+
+def test_frames_of_models_in_a_scene_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is the image of that time; --resume skips those that exist, of this scene file alone."""
+    monkeypatch.chdir(tmp_path)
+    animated().write(Path("a.glb"))
+    text = """
+render = { size = [16, 16], spp = 2, max_depth = 2 }
+environment = { color = [1, 1, 1] }
+camera = { position = [2, 1, 9] }
+mesh = [{ file = "a.glb", animation = "walk" },
+        { file = "a.glb", animation = "1", translate = [-3, -7, 0] }]
+"""
+    Path("s.toml").write_text(text)
+    asked = "s.toml", "--frames", "all", "--fps", "2", "-o", "f_#.exr"
+    written = render(*asked)
+    assert written == [f"f_{number}.exr" for number in range(5)]
+    for number in (0, 3):
+        Path("still.toml").write_text(re.sub('(animation = ".*?")', rf"\1, time = {number / 2}", text))
+        render("still.toml", "-o", "still.exr")
+        np.testing.assert_array_equal(read_image(Path(f"f_{number}.exr")), read_image(Path("still.exr")))
+    assert len({Path(name).read_bytes() for name in written}) == 5
+    Path(written[1]).unlink()
+    Path(written[3]).write_bytes(Path(written[2]).read_bytes())
+    assert render(*asked, "--resume") == [written[1], written[3]]
+    assert len(render("s.toml", "--turntable", "3", "-o", "t_#.exr")) == 3
 
 
 def test_resume_makes_what_is_missing(flight: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,22 @@ class InstanceTable(Transform):
     repeat: Any = ()
 
 
+class Copies(NamedTuple):
+    """Copies of a model's parts, one for each of `matrices` (n, 4, 4). material, name: replace the parts' own."""
+
+    matrices: NDArray[np.float64]
+    material: Material | None
+    name: str | None
+
+    def of(self, parts: Sequence[Instance]) -> list[Instance]:
+        """Return the copies of these parts."""
+        return [
+            replace(moved(each, matrix), material=self.material or each.material, name=self.name or each.name)
+            for matrix in self.matrices
+            for each in parts
+        ]
+
+
 class InstanceReader:
     """Instances by the names of the mesh tables that they refer to."""
 
@@ -47,9 +63,8 @@ class InstanceReader:
 
     def add(self, name: str | None, shown: Model) -> None:
         """Register what a mesh table of this name, or of none, shows; an empty model if the table is invalid."""
-        own = [Instance(mesh, name=mesh.name) for mesh in shown.meshes]
         if name is not None:
-            self._shown.setdefault(name, []).append(own + shown.instances)
+            self._shown.setdefault(name, []).append(parts_to_copy(shown))
 
     def problems(self, mesh: object, where: str) -> list[str]:
         """Return a problem unless exactly one table has the name `mesh`."""
@@ -57,9 +72,9 @@ class InstanceReader:
         wrong = f"is the name of {len(tables)} meshes; rename them" if tables else unknown(mesh, self._shown)
         return [] if len(tables) == 1 else [f"{where}.mesh: {show(mesh)} {wrong}"]
 
-    def materials(self, table: InstanceTable) -> list[Material | None]:
-        """Return the materials of what the table's mesh shows, without the table's own."""
-        return [each.material for each in self._shown.get(str(table.mesh), [[]])[0]]
+    def parts(self, table: InstanceTable) -> list[Instance]:
+        """Return what the table's mesh shows."""
+        return self._shown.get(str(table.mesh), [[]])[0]
 
     def read(
         self,
@@ -67,8 +82,8 @@ class InstanceReader:
         repeats: Sequence[Repeat],
         material: Material | None,
         where: str,
-    ) -> list[Instance]:
-        """Return the instances of what the mesh shows, and their copies; raises SceneError for invalid transforms."""
+    ) -> Copies:
+        """Return the copies of what the mesh shows; raises SceneError for invalid transforms."""
         if (count := prod(repeat.count for repeat in repeats)) > MOST_INSTANCES:
             raise SceneError(
                 f"{where}.repeat: makes {count} copies; reduce the counts to at most {MOST_INSTANCES} in all"
@@ -80,12 +95,12 @@ class InstanceReader:
             if found.any():
                 copy = f", of copy {found.argmax()}," if found.size > 1 else ""
                 raise SceneError(f"{where}: its transform{copy} {fault}; write a nonzero scale")
-        shown = self._shown.get(str(table.mesh), [[]])[0]
-        return [
-            replace(moved(each, matrix), material=material or each.material, name=table.name or each.name)
-            for matrix in matrices
-            for each in shown
-        ]
+        return Copies(matrices, material, table.name)
+
+
+def parts_to_copy(model: Model) -> list[Instance]:
+    """Return a model's meshes, as instances, and its instances."""
+    return [Instance(mesh, name=mesh.name) for mesh in model.meshes] + model.instances
 
 
 def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray[np.float64]:
@@ -95,17 +110,6 @@ def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray
         for _ in range(count - 1):
             copies.append(step @ copies[-1])
     return np.concatenate(copies)
-
-
-def placed_animation(model: Model, matrix: Matrix) -> Model:
-    """Apply an affine matrix to a model and its animation."""
-    still, animation = placed(model, matrix, None, {}), model.animation
-    if animation is None:
-        return still
-    pose = animation.pose
-    return replace(
-        still, animation=replace(animation, base=still, pose=lambda seconds: placed(pose(seconds), matrix, None, {}))
-    )
 
 
 def placed(model: Model, matrix: Matrix, material: Material | None, others: dict[str, Material]) -> Model:

@@ -19,6 +19,8 @@ from ...scene.geometry.normals import Normals, choose_normals
 from ...scene.geometry.transform import Matrix
 from ...scene.materials.material_types import Diffuse
 from ...scene.model import Instance, Mesh, Model, Vector
+from ...scene.model_pose import with_poses
+from ...scene.provenance import parts_of
 from ...scene.validation.validate import mesh_problems
 from ..model_choice import DEFAULT, ModelChoice
 from ..models import read_model
@@ -63,11 +65,24 @@ class MeshTable(Transform):
         Raises SceneError for a file that cannot be read, indices out of range, no geometry or both kinds, and
         crease_degrees without computed normals.
         """
-        if self.crease_degrees is None:
-            return self._read(folder, where)
-        if self.normals != "smooth":
+        if self.crease_degrees is not None and self.normals != "smooth":
             raise SceneError(f'{where}: has crease_degrees, but normals = "{self.normals}"; write normals = "smooth"')
         model = self._read(folder, where)
+        return with_poses(model if self.animation is not None else replace(model, animation=None), self._finished)
+
+    def _finished(self, model: Model) -> Model:
+        """Return the model with the table's name and creases, without its animation."""
+        if self.file is not None and self.name is not None:
+            alone = len(model.meshes) + len(model.instances) == 1
+            names = [self.name if alone else f"{self.name} {part.name}" for part in parts_of(model)]
+            count = len(model.meshes)
+            model = replace(
+                model,
+                meshes=[replace(mesh, name=name) for mesh, name in zip(model.meshes, names)],
+                instances=[replace(each, name=name) for each, name in zip(model.instances, names[count:])],
+            )
+        if self.crease_degrees is None:
+            return replace(model, animation=None)
         meshes = {
             number: creased(mesh, self.crease_degrees)
             for number, mesh in meshes_by_id([*model.instances, *map(Instance, model.meshes)]).items()
@@ -76,19 +91,18 @@ class MeshTable(Transform):
             model,
             meshes=[meshes[id(mesh)] for mesh in model.meshes],
             instances=[replace(each, mesh=meshes[id(each.mesh)]) for each in model.instances],
+            animation=None,
         )
 
     def _read(self, folder: Path, where: str) -> Model:
         inline = self.vertices is not None or self.faces is not None or self.uv is not None
         if self.file is not None and inline:
             raise SceneError(f"{where}: has both a file and vertices, faces or uv; keep one of them")
-        # In a scene file the model is a still.
-        time = 0.0 if self.animation is not None and self.time is None else self.time
         choice = ModelChoice(
             scene=self.scene,
             variant=self.variant,
             animation=self.animation,
-            time=time,
+            time=self.time,
             light_unit=self.light_unit,
             ignore_extensions=self.ignore_extensions,
         )
@@ -122,8 +136,4 @@ class MeshTable(Transform):
                 file,
                 CONVERTED[model.converted_from],
             )
-        if self.name is not None:
-            parts: list[Mesh | Instance] = [*model.meshes, *model.instances]
-            for part in parts:
-                part.name = self.name if len(parts) == 1 else f"{self.name} {part.name}"
         return model

@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ...errors import SceneError
-from ...scene.animation import Animation, Keyframe
+from ...scene.animation import Animation, Keyframe, SceneAnimation
 from ...scene.default_sky import SUN, default_sky
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.lights import LIGHTS, Light
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
 from ...scene.materials.textures import WHITE, Texture
 from ...scene.model import Camera, Environment, Instance, Model, Origin, RenderSettings, Scene, Source, Sphere
+from ...scene.model_pose import with_poses
 from ...scene.provenance import material_of, parts_of
 from ...scene.validation.field_types import field_problems, show, unknown, usable
 from ..images.image_reader import read_picture
 from ..referenced_files import name_of
 from .instance_table import InstanceReader, InstanceTable, Repeat, placed
 from .mesh_table import MeshTable
+from .moving_mesh import MovingMesh, shown
 from .texture_table import TextureReader
 from .values import toml_key
 
@@ -52,6 +55,7 @@ class SceneReader:
         self._textures = TextureReader(path.parent)
         self._cameras: dict[str, Camera] = {}
         self._instances = InstanceReader()
+        self._moving: list[tuple[str | None, MovingMesh]] = []
         self._source = Source()
         self.problems = [f'key "{key}" {unknown(key, SECTIONS)}' for key in document if key not in SECTIONS]
 
@@ -87,7 +91,7 @@ class SceneReader:
             environment=environment or Environment(),
             render=render or RenderSettings(),
             name=name_of(self._path),
-            animation=self._animation(),
+            animation=self._with_models(self._animation()),
             materials=self._materials,
             source=self._sources(),
         )
@@ -115,7 +119,7 @@ class SceneReader:
         return self._cameras.get(name, Camera())
 
     def _animation(self) -> Animation | None:
-        """Return the animation; None if there is none or if it is invalid."""
+        """Return the camera's animation; None if there is none or if it is invalid."""
         if not {"animation", "keyframe"} & set(self._document):
             return None
         table = self._table("animation")
@@ -125,6 +129,15 @@ class SceneReader:
         keys = [self._keyframe(values, f"keyframe[{i}]") for i, values in enumerate(self._tables("keyframe"))]
         known = tuple(key for key in keys if key)
         return replace(whole, keyframes=known) if whole and len(known) == len(keys) else None
+
+    def _with_models(self, camera: Animation | None) -> Animation | SceneAnimation | None:
+        """Return the scene's animation, of its camera and of its moving meshes."""
+        models = tuple(moving.animation() for _, moving in self._moving)
+        if not models:
+            return camera
+        given = camera or Animation()
+        moves = bool(given.keyframes) or given.turntable_seconds is not None
+        return SceneAnimation(models=models, camera=given if moves else None, fps=given.fps)
 
     def _keyframe(self, values: Any, where: str) -> Keyframe | None:
         if isinstance(values, dict):
@@ -243,14 +256,17 @@ class SceneReader:
         else:
             own = {mesh.material_name for mesh in (*model.meshes, *meshes_by_id(model.instances).values())}
             before = list(map(material_of, parts_of(model)))
-            model = placed(model, matrix, material, self._others(values, own, where))
+            others = self._others(values, own, where)
+            model = with_poses(model, partial(placed, matrix=matrix, material=material, others=others))
             self._source.meshes.append(Origin(self._located(values), parts_of(model), before))
         for name, camera in model.cameras.items():
             self._source.cameras.setdefault(name, self._cameras.setdefault(name, camera))
-        self._instances.add(str(values["name"]) if "name" in values else None, model)
-        shown = model if table is None or table.visible else Model(meshes=[])
-        lit = table is not None and table.lights
-        return replace(shown, lights=model.lights if lit else [], emitters=model.emitters if lit else [])
+        own_name = str(values["name"]) if "name" in values else None
+        self._instances.add(own_name, model)
+        visible, lights = table is None or table.visible, table is not None and table.lights
+        if model.animation is not None:
+            self._moving.append((own_name, MovingMesh(model, model.animation, visible, lights)))
+        return shown(model, visible, lights)
 
     def _located(self, values: Table) -> Table:
         """Return the table of a mesh with an absolute path."""
@@ -289,8 +305,13 @@ class SceneReader:
         table = self._build(InstanceTable, _one_scale(values), where)
         self.problems += self._instances.problems(values["mesh"], where) if "mesh" in values else []
         repeats = self._repeats(values.get("repeat", ()), f"{where}.repeat")
-        made = table and self._tried(self._instances.read, table, repeats, material, where) or []
-        self._source.instances.append(Origin(values, made, self._instances.materials(table) if table and made else []))
+        copies = table and self._tried(self._instances.read, table, repeats, material, where)
+        parts = self._instances.parts(table) if table and copies else []
+        made = copies.of(parts) if copies else []
+        self._source.instances.append(Origin(values, made, [each.material for each in parts]))
+        for name, moving in self._moving:
+            if copies and name == str(values["mesh"]):
+                moving.add(copies, made)
         return made
 
     def _repeats(self, values: Any, where: str) -> list[Repeat]:

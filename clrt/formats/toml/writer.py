@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scene.animation import Animation
+from ...scene.animation import Animation, SceneAnimation
 from ...scene.default_sky import default_sky
 from ...scene.editing import free_name, materials_of
 from ...scene.geometry.instancing import meshes_by_id
@@ -132,7 +132,10 @@ class _Writer:
             yield from self._section(f"[cameras.{toml_key(name)}]", cameras[name])
 
     def _animation(self) -> Iterator[str]:
-        if isinstance(animation := self._scene.animation, Animation):
+        animation = self._scene.animation
+        if isinstance(animation, SceneAnimation):  # the models' is in their tables
+            animation = replace(animation.camera or Animation(), fps=animation.fps)
+        if isinstance(animation, Animation):
             yield from self._section("[animation]", replace(animation, keyframes=()))
             for keyframe in animation.keyframes:
                 yield from self._section("[[keyframe]]", keyframe)

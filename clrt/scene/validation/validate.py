@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError, UsageError
-from ..animation import Animation, ModelAnimation
+from ..animation import Animation, ModelAnimation, SceneAnimation
 from ..camera_path import animation_problems
 from ..geometry.instancing import painted
 from ..lights import LIGHTS
@@ -46,9 +46,10 @@ def scene_problems(scene: Scene) -> list[str]:
     if problems := _list_problems(scene):
         return problems
     problems = _camera_problems(scene.camera)
-    if scene.animation is not None and not isinstance(scene.animation, ModelAnimation):
-        problems += _object_problems(scene.animation, Animation, "animation") or (
-            [] if problems else animation_problems(scene.camera, scene.animation)
+    animation = scene.animation.camera if isinstance(scene.animation, SceneAnimation) else scene.animation
+    if animation is not None and not isinstance(animation, ModelAnimation):
+        problems += _object_problems(animation, Animation, "animation") or (
+            [] if problems else animation_problems(scene.camera, animation)
         )
     problems += _environment_problems(scene.environment)
     problems += _object_problems(scene.render, RenderSettings, "render") or _raster_problems(scene)
