@@ -41,7 +41,7 @@ class LoadOptions:
     animation: str | None = flag(
         "--animation",
         metavar="NAME",
-        help="Animation of a bare glTF file, by name or number; default: none, or with --frames the first.",
+        help="Animation of a bare glTF or USD file, by name or number; default: none, or with --frames the first.",
     )
     animation_time: float | None = flag(
         "--animation-time",

@@ -278,7 +278,7 @@ def test_times(tmp_path: Path) -> None:
     path.write_text(text)
     assert extent(read_usd(path))[0, 0] == 0
     assert extent(read_usd(path, choice=ModelChoice(time=0.5)))[0, 0] == pytest.approx(5)
-    with pytest.raises(SceneError, match="a.usda: animation: 1 is unknown; the file has none"):
+    with pytest.raises(SceneError, match='a.usda: animation: 1 is unknown; use one of "stage"'):
         read_usd(path, choice=ModelChoice(animation=1))
 
 

@@ -86,3 +86,10 @@ def usdz(path: Path, files: Mapping[str, bytes], compression: int = zipfile.ZIP_
             entry.extra = (0x1986).to_bytes(2, "little") + (padding + 60).to_bytes(2, "little") + bytes(padding + 60)
             archive.writestr(entry, content)
     return path
+
+
+def animated(content: str) -> str:
+    """Return the text of a stage of time codes 12 to 36, at 48 per second, in frames of 12 per second."""
+    codes = "startTimeCode = 12\n    endTimeCode = 36\n    timeCodesPerSecond = 48\n    framesPerSecond = 12\n"
+    head = HEAD.format(meters=1, up="Y").replace("    upAxis", f"    {codes}    upAxis")
+    return head + content.replace("{", "{\n").replace("}", "\n}")

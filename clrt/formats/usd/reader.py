@@ -9,6 +9,8 @@ import logging
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...file_names import printable
+from ...scene.animation import ModelAnimation
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals
 from ...scene.geometry.transform import Matrix, scaling
@@ -36,6 +39,8 @@ from .materials import Materials
 from .meshes import Shapes
 
 log = logging.getLogger(__name__)
+#: Name of a stage's only animation.
+ANIMATION = "stage"
 
 
 def read_usd(path: Path, normals: Normals = "file", choice: ModelChoice = DEFAULT) -> Model:
@@ -43,15 +48,38 @@ def read_usd(path: Path, normals: Normals = "file", choice: ModelChoice = DEFAUL
 
     Raises SceneError naming the file and the prim that is wrong.
     """
+    with _named(path):
+        for what in ("scene", "variant"):
+            if (wanted := getattr(choice, what)) is not None:
+                chosen(wanted, [], what)
+        if choice.light_unit is not None:
+            raise SceneError("light_unit: is for glTF files; leave light_unit out")
+        model, ignored, animation = _posed(path, normals, choice.time)
+        if choice.animation is not None:
+            chosen(choice.animation, [] if animation is None else [animation.name], "animation")
+    if ignored:
+        log.warning("%s: ignored: %s", path, ", ".join(ignored))
+    return model if choice.time is not None else replace(model, animation=animation)
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Name the file in errors."""
     try:
         with np.errstate(all="ignore"):  # values that are not finite are reported
-            return _model(path, normals, choice)
+            yield
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
 
-def _model(path: Path, normals: Normals, choice: ModelChoice) -> Model:
-    arrays, facts = _content(path, choice)
+def _pose(path: Path, normals: Normals, seconds: float) -> Model:
+    with _named(path):
+        return _posed(path, normals, seconds)[0]
+
+
+def _posed(path: Path, normals: Normals, time: float | None) -> tuple[Model, list[str], ModelAnimation | None]:
+    """Return the model at a time, what is ignored, and its animation, if it has one."""
+    arrays, facts = _content(path, time)
     for layer in facts["layers"]:
         note_read(Path(layer))
     materials = Materials(path, arrays, facts)
@@ -69,32 +97,31 @@ def _model(path: Path, normals: Normals, choice: ModelChoice) -> Model:
     lights = read_lights(path, facts["lights"], materials, to_scene)
     counted = facts["ignored"] | shapes.ignored
     ignored = [f"{printable(what)} ({count})" for what, count in counted.items()]
-    if ignored := [*ignored, *materials.ignored, *lights.ignored, *no_cameras]:
-        log.warning("%s: ignored: %s", path, ", ".join(ignored))
-    return Model(
+    model = Model(
         meshes=meshes,
         instances=instances,
         cameras=cameras,
         lights=lights.lights,
         emitters=lights.emitters,
         environment=lights.environment,
+        contents={"animations": [ANIMATION] if facts["seconds"] else []},
     )
+    pose = partial(_pose, path, normals)
+    base = replace(model, meshes=list(meshes), instances=list(instances), lights=list(lights.lights))
+    animation = ModelAnimation(name=ANIMATION, seconds=facts["seconds"], base=base, pose=pose, fps=facts["fps"])
+    ignored = [*ignored, *materials.ignored, *lights.ignored, *no_cameras]
+    return model, ignored, animation if facts["seconds"] else None
 
 
-def _content(path: Path, choice: ModelChoice) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Return what the decoder process reads. Raises SceneError for a choice that USD files do not have."""
-    for what in ("scene", "variant", "animation"):
-        if (wanted := getattr(choice, what)) is not None:
-            chosen(wanted, [], what)
-    if choice.light_unit is not None:
-        raise SceneError("light_unit: is for glTF files; leave light_unit out")
+def _content(path: Path, time: float | None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+    """Return what the decoder process reads."""
     if find_spec("pxr") is None:
         raise SceneError("is read by usd-core, which is not installed; pip install usd-core, or export another format")
     if path.suffix.lower() == ".usdz":
         check_archive(path, compressed=False)
     try:
         with _suffixed(path) as readable:
-            return decode("usd", readable, time=choice.time)
+            return decode("usd", readable, time=time)
     except SceneError as error:
         message = " ".join(printable(str(error)).split())
         raise SceneError(f"cannot be read as USD: {message}; export it again") from None

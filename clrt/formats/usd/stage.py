@@ -2,8 +2,8 @@
 
 Arrays: of shape number i "points i" (n, 3), "counts i" (f,), "indices i" (c,), "holes i", "subset i j", and "primvar i
 j" (k, c); "texture t", the bytes of an image in an archive; "numbers" (k,) and "matrices" (k, 4, 4), placed shapes.
-Facts: `meters` per unit, `up`, `layers`, files that were read; `shapes`, `materials`, `textures`, `lights` and
-`cameras`, a dict for each; `ignored`, counts by what it is.
+Facts: `meters` per unit, `up`, `seconds` and `fps` of its animation, `layers`, files that were read; `shapes`,
+`materials`, `textures`, `lights` and `cameras`, a dict for each; `ignored`, counts by what it is.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ Found = tuple[dict[str, Array], dict[str, Any]]
 MOST_PRIMS = 1 << 20
 MOST_PLACES = 1 << 20
 MOST_DEPTH = 16
+#: Attributes of a SkelAnimation.
+ANIMATED = ("translations", "rotations", "scales", "blendShapeWeights")
 #: Purposes that are rendered.
 RENDERED = ("default", "render")
 
@@ -46,6 +48,7 @@ def decode(file: str, time: float | None = None) -> Found:
     code = Usd.TimeCode.EarliestTime() if start is None else Usd.TimeCode(start)
     if time is not None:
         code = Usd.TimeCode((start or 0.0) + time * stage.GetTimeCodesPerSecond())
+    seconds = _seconds(stage)
     _bake_skins(stage, 0.0 if start is None and time is None else code.GetValue())
     content = _Content(code)
     content.add(stage.GetPseudoRoot())
@@ -55,6 +58,8 @@ def decode(file: str, time: float | None = None) -> Found:
     return content.arrays, {
         "meters": UsdGeom.GetStageMetersPerUnit(stage),
         "up": str(UsdGeom.GetStageUpAxis(stage)),
+        "seconds": seconds,
+        "fps": stage.GetFramesPerSecond(),
         "layers": layers,
         "shapes": content.shapes.facts,
         "materials": content.materials.facts,
@@ -65,13 +70,30 @@ def decode(file: str, time: float | None = None) -> Found:
     }
 
 
+def _seconds(stage: Any) -> float:
+    """Return the duration of the stage's time codes; 0 if it has none, or no values at times."""
+    if not stage.HasAuthoredTimeCodeRange() or not any(layer.ListAllTimeSamples() for layer in stage.GetUsedLayers()):
+        return 0.0
+    codes, rate = stage.GetEndTimeCode() - stage.GetStartTimeCode(), stage.GetTimeCodesPerSecond()
+    return float(codes / rate) if rate > 0 and 0 < codes < np.inf else 0.0
+
+
 def _bake_skins(stage: Any, time: float) -> None:
-    """Replace the points of skinned meshes by those that their skeletons make of them at a time code."""
+    """Replace the points of skinned meshes by those that their skeletons make of them at a time code.
+
+    BakeSkinning skips times between the samples of an animation, which therefore gets one.
+    """
     from pxr import Gf, UsdSkel
 
-    if any(prim.IsA(UsdSkel.Root) for prim in stage.Traverse()):
-        stage.SetEditTarget(stage.GetSessionLayer())
-        UsdSkel.BakeSkinning(stage.Traverse(), Gf.Interval(time, time))
+    if not any(prim.IsA(UsdSkel.Root) for prim in stage.Traverse()):
+        return
+    stage.GetSessionLayer().timeCodesPerSecond = stage.GetTimeCodesPerSecond()
+    stage.SetEditTarget(stage.GetSessionLayer())
+    for animation in [prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Animation)]:
+        for attribute in map(animation.GetAttribute, ANIMATED):
+            if (value := attribute.Get(time)) is not None:
+                attribute.Set(value, time)
+    UsdSkel.BakeSkinning(stage.Traverse(), Gf.Interval(time, time))
 
 
 class Visit(NamedTuple):
