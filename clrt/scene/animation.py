@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +11,7 @@ from .fields.tuples import tuples_for_lists
 from .materials.textures import NonNegative
 
 if TYPE_CHECKING:
+    from .materials.material import Material
     from .model import Model
 
 Vector = tuple[float, float, float]
@@ -72,13 +73,15 @@ class Animation:
 class ModelAnimation:
     """Animation of a model file. fps: frames per second; seconds: its duration.
 
-    base: the model as it is in the scene; pose: returns the model at a time in seconds.
+    base: the model as it is in the scene; pose: returns the model at a time in seconds; own: if materials are animated,
+    those of the base's parts (model_pose.own_materials), which users may replace.
     """
 
     name: str
     seconds: float
     base: Model
     pose: Callable[[float], Model]
+    own: Sequence[Material | None] = ()
     fps: Positive = 24.0
 
     @property

@@ -213,7 +213,7 @@ def test_sheets_have_the_color_of_their_volume(tmp_path: Path) -> None:
     ("name", "refused"),
     [
         ("KHR_materials_novel", False),
-        ("KHR_animation_pointer", False),
+        ("KHR_animation_novel", False),
         ("MSFT_texture_dds", False),
         ("EXT_structural_metadata", False),
         ("MPEG_buffer_circular", True),

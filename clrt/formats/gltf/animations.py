@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from . import schema as gltf
 from .accessors import GltfData, normalised
+from .pointers import NODE, kind_of, with_value
 
 Doubles = NDArray[np.float64]
 #: Animated properties of a node, with the accessor type of their values.
@@ -22,9 +22,9 @@ CLOSE = 1e-6
 
 
 class Track(NamedTuple):
-    """Keyframes of one property. times: (k,), ascending; values: (k, PARTS, n)."""
+    """Keyframes of one property, of a node or named by a pointer. times: (k,), ascending; values: (k, PARTS, n)."""
 
-    node: int
+    node: int | None
     property: str
     interpolation: str
     times: NDArray[np.floating]
@@ -72,30 +72,44 @@ class Clip:
         self.ignored: list[str] = []
         self._tracks: list[Track] = []
         for channel in source.channels:
-            target = channel.target
-            if target.node is None or target.path not in PROPERTIES:
-                self.ignored += [] if target.path in PROPERTIES else [f'"{target.path}" of {name}']
-                continue
             sampler = gltf.entry(source.samplers, channel.sampler, "sampler", name)
-            track = _track(data, target.node, target.path, sampler, f"{name}, {target.path} of node {target.node}")
-            if gltf.entry(document.nodes, target.node, "node", name).matrix and target.path != "weights":
-                self.ignored.append(f"{target.path} of node {target.node}, which has a matrix, in {name}")
+            node, path = _target(channel.target)
+            if node is None and path in PROPERTIES:
+                continue
+            kind = (PROPERTIES[path], 0) if node is not None and path in PROPERTIES else kind_of(document, path)
+            if kind is None:
+                self.ignored.append(f'"{path}" of {name}')
+                continue
+            user = f"{name}, {path}" if node is None else f"{name}, {path} of node {node}"
+            track = _track(data, node, path, kind, sampler, user)
+            if node is not None and gltf.entry(document.nodes, node, "node", name).matrix and path != "weights":
+                self.ignored.append(f"{path} of node {node}, which has a matrix, in {name}")
             else:
                 self._tracks.append(track)
+
+    @property
+    def changes_materials(self) -> bool:
+        """Whether it animates materials."""
+        return any(track.property.startswith("/materials/") for track in self._tracks)
 
     @property
     def seconds(self) -> float:
         """The time of the last keyframe; 0 without any."""
         return max((float(track.times[-1]) for track in self._tracks), default=0.0)
 
-    def posed(self, nodes: Sequence[gltf.Node], time: float) -> list[gltf.Node]:
-        """Return the document's nodes with their properties at a time in seconds."""
+    def posed(self, document: gltf.Document, time: float) -> gltf.Document:
+        """Return the document with its properties at a time in seconds."""
         changed: dict[int, dict[str, list[float]]] = {}
         for track in self._tracks:
-            changed.setdefault(track.node, {})[track.property] = track.at(time).tolist()
-        return [
-            node.model_copy(update=changed[index]) if index in changed else node for index, node in enumerate(nodes)
+            if track.node is None:
+                document = with_value(document, track.property, track.at(time))
+            else:
+                changed.setdefault(track.node, {})[track.property] = track.at(time).tolist()
+        nodes = [
+            node.model_copy(update=changed[index]) if index in changed else node
+            for index, node in enumerate(document.nodes)
         ]
+        return document.model_copy(update={"nodes": nodes})
 
 
 def animation_names(document: gltf.Document) -> list[str]:
@@ -103,19 +117,36 @@ def animation_names(document: gltf.Document) -> list[str]:
     return gltf.unique_names("animation", [animation.name for animation in document.animations])
 
 
-def _track(data: GltfData, node: int, path: str, sampler: gltf.AnimationSampler, user: str) -> Track:
-    """Return the keyframes of a channel. Raises SceneError for times that do not ascend, other numbers of values, and
-    values that are not finite."""
-    kind = str(sampler.interpolation)
-    parts = PARTS.get(kind)
+def _target(target: gltf.AnimationTarget) -> tuple[int | None, str]:
+    """Return the node and the property of a channel, or None and the pointer to another property."""
+    pointer = target.extensions.KHR_animation_pointer
+    if target.path != "pointer" or pointer is None:
+        return target.node, target.path
+    match = NODE.fullmatch(pointer.pointer)
+    return (int(match[1]), match[2]) if match else (None, pointer.pointer)
+
+
+def _track(
+    data: GltfData,
+    node: int | None,
+    path: str,
+    kind: tuple[str, int],
+    sampler: gltf.AnimationSampler,
+    user: str,
+) -> Track:
+    """Return the keyframes of a channel. kind: see `kind_of`; any number of weights. Raises SceneError for times that
+    do not ascend, other numbers of values, and values that are not finite."""
+    accessor, size = kind
+    interpolation = str(sampler.interpolation)
+    parts = PARTS.get(interpolation)
     if parts is None:
-        raise SceneError(f'{user}: its interpolation is "{kind}"; write one of {", ".join(PARTS)}')
+        raise SceneError(f'{user}: its interpolation is "{interpolation}"; write one of {", ".join(PARTS)}')
     times = data.array(sampler.input, "SCALAR", user)[:, 0]
-    values = data.array(sampler.output, PROPERTIES[path], user)
+    values = data.array(sampler.output, accessor, user)
     if path in ("rotation", "weights"):
         values = normalised(values)
     count = parts * len(times)
-    if len(values) % count or (path != "weights" and len(values) != count):
+    if len(values) % count or (path != "weights" and len(values) != count * max(size, 1)):
         raise SceneError(f"{user}: has {len(values)} values for {len(times)} times; export it again")
     if not np.isfinite(times).all() or (np.diff(times) < 0).any():
         raise SceneError(f"{user}: its times do not ascend; export it again")
@@ -124,4 +155,4 @@ def _track(data: GltfData, node: int, path: str, sampler: gltf.AnimationSampler,
         raise SceneError(f"{user}: has a value that is not finite; export it again")
     if path == "rotation" and not values[:, parts // 2].any(axis=1).all():
         raise SceneError(f"{user}: has a rotation [0, 0, 0, 0]; write [0, 0, 0, 1] for none")
-    return Track(node, path, kind, times, values)
+    return Track(node, path, interpolation, times, values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -17,11 +17,11 @@ Placed = tuple[gltf.Node, Matrix]
 class NodeGraph:
     """Visible nodes of one of the document's scenes: `placed`, depth first, each with its matrix to the world.
 
-    Without nodes each mesh gets the identity. nodes: the document's, as posed; scene: its index; None for the default.
+    Without nodes each mesh gets the identity. scene: its index; None for the default.
     """
 
-    def __init__(self, document: gltf.Document, nodes: Sequence[gltf.Node], scene: int | None = None) -> None:
-        self._nodes = nodes
+    def __init__(self, document: gltf.Document, scene: int | None = None) -> None:
+        self._nodes = document.nodes
         self._worlds: dict[int, Matrix] = {}
         self.placed: list[Placed] = list(self._shown(document, document.scene or 0 if scene is None else scene))
 

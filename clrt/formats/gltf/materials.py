@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -33,12 +33,19 @@ class MaterialPart(NamedTuple):
 
 
 class Materials:
-    """Materials of one file."""
+    """Materials of one file. sources, textures: if they are animated, the materials at a time, and the textures that
+    were read."""
 
-    def __init__(self, data: GltfData, variant: int | None = None) -> None:
-        self._data, self._variant = data, variant
+    def __init__(
+        self,
+        data: GltfData,
+        variant: int | None = None,
+        sources: Sequence[looks.Material] | None = None,
+        textures: Textures | None = None,
+    ) -> None:
+        self._variant, self._sources = variant, data.document.materials if sources is None else sources
         self._names = gltf.unique_names("material", [material.name for material in data.document.materials])
-        self.textures = Textures(data)
+        self.textures = textures or Textures(data)
         self._texture, self._bend = self.textures.texture, self.textures.normal_map
         #: Features that had an effect in the file, but are not rendered, by the material's name.
         self.unused: dict[str, list[str]] = {}
@@ -74,7 +81,7 @@ class Materials:
         opaque = colors if colors is None or colors.shape[1] == 3 else colors[:, :3]
         if index is None:
             return [MaterialPart(MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0), faces, opaque)]
-        source = converted(gltf.entry(self._data.document.materials, index, "material", user))
+        source = converted(gltf.entry(self._sources, index, "material", user))
         pbr, extensions = source.pbrMetallicRoughness, source.extensions
         base = self._texture(pbr.baseColorTexture, primitive, user)
         coverage = _coverage(source, base)

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...scene.animation import ModelAnimation
@@ -20,6 +21,7 @@ from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals
 from ...scene.geometry.transform import Matrix
 from ...scene.model import Mesh, Model
+from ...scene.model_pose import own_materials
 from ...scene.validation.validate import mesh_problems
 from ..frame_model import bounds
 from ..model_choice import DEFAULT, ModelChoice, chosen
@@ -76,10 +78,13 @@ class GltfFile:
         }
         self._scene = None if choice.scene is None else chosen(choice.scene, self._names["scenes"], "scene")
         variant = None if choice.variant is None else chosen(choice.variant, self._names["variants"], "variant")
+        self._variant, self._normals = variant, normals
         self._materials = Materials(self._data, variant)
         self._primitives = Primitives(self._data, self._materials, normals)
         self._shapes: dict[Shape, Mesh] = {}
         self._unit = choice.light_unit
+        #: Bounding box of the last pose that shows anything.
+        self._box: NDArray[np.float64] | None = None
 
     def model(self) -> Model:
         """Return the model as chosen, with its animation, and log what is left out."""
@@ -91,7 +96,9 @@ class GltfFile:
             model.converted_from = self._unit
         if clip is not None and self._choice.time is None:
             base = replace(model, meshes=list(model.meshes), instances=list(model.instances), lights=list(model.lights))
-            model.animation = ModelAnimation(name=name, seconds=clip.seconds, base=base, pose=partial(self._at, clip))
+            own = own_materials(base) if clip.changes_materials else ()
+            pose = partial(self._at, clip)
+            model.animation = ModelAnimation(name=name, seconds=clip.seconds, base=base, pose=pose, own=own)
         return model
 
     def _clip(self) -> tuple[Clip | None, str, list[str]]:
@@ -113,45 +120,52 @@ class GltfFile:
 
     def _posed(self, clip: Clip | None, time: float) -> tuple[Model, list[str]]:
         """Return the model at a time of an animation, or without one, and descriptions of cameras that are left out."""
-        document = self._data.document
-        graph = NodeGraph(document, document.nodes if clip is None else clip.posed(document.nodes, time), self._scene)
-        places = list(self._places(graph))
+        document = self._data.document if clip is None else clip.posed(self._data.document, time)
+        graph = NodeGraph(document, self._scene)
+        places = list(self._places(graph, document))
         meshes, instances = shown(places)
-        if not meshes and not instances:
-            raise SceneError("its scene contains no triangles; export a model with triangle meshes")
         every = [*meshes, *meshes_by_id(instances).values()]
         problems = [problem for mesh in every for problem in mesh_problems(mesh, "mesh")]
         if problems:
             raise SceneError(problems)
-        box = np.stack(bounds(meshes, instances))
+        if every:
+            self._box = np.stack(bounds(meshes, instances))
+        elif self._box is None:
+            raise SceneError("its scene contains no triangles; export a model with triangle meshes")
+        box = self._box
         cameras, left_out = read_cameras(document, graph.placed, box.mean(axis=0))
         lights = list(read_lights(document, graph.placed))
         self._unit = self._unit or guess_unit(lights, str(document.asset.generator), box)
         lights = [to_radiometric(light, self._unit) for light in lights]
         return Model(meshes=meshes, instances=instances, cameras=cameras, lights=lights), left_out
 
-    def _places(self, graph: NodeGraph) -> Iterator[tuple[Mesh, Matrix]]:
+    def _places(self, graph: NodeGraph, document: gltf.Document) -> Iterator[tuple[Mesh, Matrix]]:
         """Yield the meshes of all nodes with their matrices.
 
         A skinned mesh is in the world already, whatever its node's own transform is (specification 3.7.3.3).
         """
         shapes: dict[Shape, Mesh] = {}
+        primitives, known = self._primitives, self._shapes
+        if document.materials is not self._data.document.materials:
+            materials = Materials(self._data, self._variant, document.materials, self._materials.textures)
+            primitives, known = Primitives(self._data, materials, self._normals), {}
         for node, matrix in graph.placed:
             if node.mesh is None:
                 continue
-            weights = weights_of(node, gltf.entry(self._data.document.meshes, node.mesh, "mesh", "a node"))
+            weights = weights_of(node, gltf.entry(document.meshes, node.mesh, "mesh", "a node"))
             joints = None if node.skin is None else joint_matrices(self._data, graph, node.skin)
             rigid, bent = list[Mesh](), list[Mesh]()
-            for number, stored in enumerate(self._primitives.of(node.mesh)):
+            for number, stored in enumerate(primitives.of(node.mesh)):
                 if joints is not None and stored.influences is not None:
-                    bent.append(self._primitives.shaped(stored, weights, joints))
+                    bent.append(primitives.shaped(stored, weights, joints))
                     continue
                 key = node.mesh, number, weights
-                shapes[key] = self._shapes.get(key) or shapes.get(key) or self._primitives.shaped(stored, weights)
+                shapes[key] = known.get(key) or shapes.get(key) or primitives.shaped(stored, weights)
                 rigid.append(shapes[key])
             yield from ((mesh, place) for place in matrices(self._data, node, matrix) for mesh in rigid)
             yield from ((mesh, np.eye(4)) for mesh in bent)
-        self._shapes = shapes
+        if primitives is self._primitives:
+            self._shapes = shapes
 
     def _contents(self, others: Iterable[str]) -> dict[str, list[str]]:
         """Return what the file has by kind, see `Model`, and log one warning that lists what is not rendered.

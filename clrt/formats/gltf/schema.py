@@ -47,6 +47,7 @@ EXTENSIONS = frozenset(
         "EXT_meshopt_compression",
         "EXT_texture_avif",
         "EXT_texture_webp",
+        "KHR_animation_pointer",
         "KHR_draco_mesh_compression",
         "KHR_lights_punctual",
         "KHR_mesh_quantization",
@@ -243,9 +244,18 @@ class Skin(Part):
     inverseBindMatrices: Index | None = None
 
 
+class AnimationPointer(Part):
+    pointer: str
+
+
+class TargetExtensions(Part):
+    KHR_animation_pointer: AnimationPointer | None = None
+
+
 class AnimationTarget(Part):
     path: str
     node: Index | None = None
+    extensions: TargetExtensions = TargetExtensions()
 
 
 class AnimationChannel(Part):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from ...scene.animation import ModelAnimation
 from ...scene.model import Instance, Model
+from ...scene.model_pose import own_materials
 from .instance_table import Copies, parts_to_copy
 
 
@@ -30,7 +31,7 @@ class MovingMesh:
         """Return the animation of all that the table and its copies have in the scene."""
         base = shown(self.model, self.visible, self.lights)
         base = replace(base, instances=[*base.instances, *self.made], animation=None)
-        return replace(self.played, base=base, pose=self._at)
+        return replace(self.played, base=base, pose=self._at, own=own_materials(base) if self.played.own else ())
 
     def _at(self, seconds: float) -> Model:
         model = self.played.pose(seconds)
