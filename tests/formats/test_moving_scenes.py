@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -143,9 +144,19 @@ def test_saved_scene_files_move_too(tmp_path: Path) -> None:
     scene = clrt.load(written(tmp_path, SCENE + KEYFRAMES))
     save_scene(scene, tmp_path / "saved.toml")
     again = clrt.load(tmp_path / "saved.toml")
+    assert len(again.lights) == 2
     for (_, one), (_, other) in zip(clrt.frames(scene), clrt.frames(again), strict=True):
-        assert one.camera == other.camera
+        assert one.camera == other.camera and one.lights == other.lights
         np.testing.assert_array_equal(one.meshes[1].vertices, other.meshes[1].vertices)
+
+
+def test_models_that_are_saved_as_stills(tmp_path: Path) -> None:
+    """A moved mesh of a program's is written as it is; without another model the scene then has no animation."""
+    scene = clrt.load(written(tmp_path, "[[mesh]]\nfile = 'a.glb'\nanimation = 'walk'"))
+    scene.meshes[0] = replace(scene.meshes[0], vertices=scene.meshes[0].vertices + np.float32(1))
+    save_scene(scene, tmp_path / "saved.toml")
+    saved = clrt.load(tmp_path / "saved.toml")
+    assert saved.animation is None and saved.meshes[0].vertices == pytest.approx(scene.meshes[0].vertices)
 
 
 @pytest.mark.parametrize(

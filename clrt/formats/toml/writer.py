@@ -102,6 +102,10 @@ class _Writer:
         self._pictures: dict[int, str] = {}
         self._left: dict[tuple[object, ...], list[Mesh | Instance]] = {}
         self._give_back([*scene.meshes, *scene.instances])
+        #: Lights that move with models, by the table of these, and those whose table was written.
+        self._lights, self._moving = dict(self._moving_lights()), set[int]()
+        #: Whether a table of a moving model was written.
+        self._moves = False
         self._tables: set[str] = set()
         objects = [*self._read_meshes(), *self._own_objects(), *self._spheres()]
         name = scene.name.encode("unicode_escape").decode()
@@ -114,7 +118,8 @@ class _Writer:
             *self._environment(scene.environment),
         ]
         for light in scene.lights:
-            head += self._section("[[light]]", light, light.kernel)
+            if id(light) not in self._moving:
+                head += self._section("[[light]]", light, light.kernel)
         for name, material in self._materials.items():
             head += self._section(f"[materials.{toml_key(name)}]", material, material.kernel)
         self.files.text = "\n".join([*head, *objects]) + "\n"
@@ -134,6 +139,8 @@ class _Writer:
     def _animation(self) -> Iterator[str]:
         animation = self._scene.animation
         if isinstance(animation, SceneAnimation):  # the models' is in their tables
+            if animation.camera is None and not self._moves:
+                return
             animation = replace(animation.camera or Animation(), fps=animation.fps)
         if isinstance(animation, Animation):
             yield from self._section("[animation]", replace(animation, keyframes=()))
@@ -168,7 +175,11 @@ class _Writer:
             assigned = self._assigned(origin, parts) if parts else None
             if assigned is not None:
                 self._tables.add(str(origin.table.get("name")))
-                yield from ("", "[[mesh]]", *self._keys(origin.table), *assigned)
+                self._moves |= _moves(origin.table)
+                lights = self._lights.get(id(origin.table), set())
+                self._moving |= lights
+                lit = ["lights = true"] if lights else []
+                yield from ("", "[[mesh]]", *self._keys(origin.table), *lit, *assigned)
             elif parts:
                 self._give_back(parts)
         for origin in self._source.instances:
@@ -179,6 +190,16 @@ class _Writer:
                     yield f"material = {toml_value(self._name_of(parts[0].material))}"
             else:
                 self._give_back(parts)
+
+    def _moving_lights(self) -> Iterator[tuple[int, set[int]]]:
+        """Yield the tables of moving models whose lights are unchanged, and these, by their ids."""
+        animation, lights = self._scene.animation, {id(light) for light in self._scene.lights}
+        models = animation.models if isinstance(animation, SceneAnimation) else ()
+        moving = [origin.table for origin in self._source.meshes if _moves(origin.table)]
+        for table, model in zip(moving, models):
+            theirs = {id(light) for light in model.base.lights}
+            if theirs <= lights:
+                yield id(table), theirs
 
     def _claimed(self, origin: Origin) -> list[Mesh | Instance]:
         """Return the scene's objects that are the origin's parts, maybe in other materials; empty if any is missing."""
@@ -318,6 +339,11 @@ class _Writer:
             return Path(os.path.relpath(file, self._folder)).as_posix()
         except ValueError:  # on another drive
             return file.as_posix()
+
+
+def _moves(table: Mapping[str, Any]) -> bool:
+    """Return whether the model of a [[mesh]] table moves."""
+    return "animation" in table and "time" not in table
 
 
 def _default_image() -> NDArray[np.float32]:
