@@ -9,13 +9,13 @@ from dataclasses import replace
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from ..errors import SceneError, UsageError, check_choice
 from ..file_names import StrPath
 from ..scene.axes_and_units import CONVERTED, Axis, Unit
 from ..scene.default_sky import SUN, default_sky
-from ..scene.geometry.transform import rotation, transform_light
+from ..scene.geometry.transform import rotation, transform_light, translation
 from ..scene.model import Instance, Mesh, Model, Scene
 from ..scene.model_pose import with_poses
 from ..scene.provenance import source_of_model
@@ -103,11 +103,16 @@ def _load_model(
     choice, moving: see `load`.
     """
     model = read_model(path, choice=choice)
-    placing = {"up": up or model.up, "unit": unit or model.unit}
+    placing: dict[str, Any] = {"up": up or model.up, "unit": unit or model.unit}
     placing = {key: value for key, value in placing.items() if value != getattr(MeshTable, key)}
+    matrix = upright(up or model.up, unit or model.unit)
+    if any(model.center):
+        placing["translate"] = tuple((-matrix[:3, :3] @ model.center).tolist())
+        x, y, z = placing["translate"]
+        matrix = translation((x, y, z)) @ matrix
+        log.warning("%s: is far from the origin; it is moved there, by (%.9g, %.9g, %.9g)", path, x, y, z)
     if placing:
-        to_world = upright(up or model.up, unit or model.unit)
-        model = with_poses(model, partial(placed, matrix=to_world, material=None, others={}))
+        model = with_poses(model, partial(placed, matrix=matrix, material=None, others={}))
     if model.converted_from is not None:
         log.warning(
             "%s: %s; --light-unit radiometric takes them as W/sr and W/m²", path, CONVERTED[model.converted_from]

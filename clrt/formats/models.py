@@ -8,7 +8,7 @@ Parsers name arrays as trimesh does. They may pass on NaN and invalid indices, s
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +20,9 @@ from ..file_names import StrPath
 from ..scene.geometry.instancing import baked
 from ..scene.geometry.normals import Normals, choose_normals
 from ..scene.materials.material_types import Diffuse
-from ..scene.model import Instance, Mesh, Model
+from ..scene.model import Instance, Mesh, Model, Vector
 from ..scene.validation.validate import mesh_problems
+from .far_origin import far_center
 from .images.image_reader import linear_from_srgb
 from .model_choice import DEFAULT, ModelChoice
 from .placed_meshes import shown
@@ -31,7 +32,8 @@ log = logging.getLogger(__name__)
 
 
 def read_mesh(path: StrPath, normals: Normals = "file") -> list[Mesh]:
-    """Return the meshes of a model file, as `read_model` reads them, with its instances as further ones."""
+    """Return the meshes of a model file, as `read_model` reads them, relative to its center, with its instances as
+    further ones."""
     model = read_model(path, normals)
     return model.meshes + [baked(each) for each in model.instances]
 
@@ -109,8 +111,10 @@ def of_parts(parse: Callable[[Path], dict[str, Any]]) -> Callable[[Path, Normals
         try:
             with np.errstate(all="ignore"):  # values that are not finite are reported
                 parts = parse(path)
-                meshes, instances = _placed(_meshes(path, parts, normals), parts.get("places"))
-                return Model(meshes=meshes, instances=instances, up=parts.get("up", "y"), unit=parts.get("unit", "m"))
+                center = (0.0, 0.0, 0.0) if "places" in parts else _center(_pieces(path, parts).values())
+                meshes, instances = _placed(_meshes(path, parts, normals, center), parts.get("places"))
+                up, unit = parts.get("up", "y"), parts.get("unit", "m")
+                return Model(meshes=meshes, instances=instances, up=up, unit=unit, center=center)
         except SceneError as error:
             raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
@@ -134,16 +138,31 @@ SUFFIXES = tuple(FORMATS)
 CHOOSING = {".glb", ".gltf", *USD}
 
 
-def _meshes(path: Path, parts: dict[str, Any], normals: Normals) -> list[Mesh]:
-    """Build meshes from trimesh's keyword arguments for one mesh or for several."""
+def _pieces(path: Path, parts: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return trimesh's keyword arguments by mesh, of those that have triangles."""
     several = parts.get("geometry", {name_of(path): parts})
-    pieces = {name: piece for name, piece in several.items() if _size(piece.get("faces"))}
+    return {name: piece for name, piece in several.items() if _size(piece.get("faces"))}
+
+
+def _center(pieces: Iterable[dict[str, Any]]) -> Vector:
+    """Return the point to subtract from all coordinates, see `far_center`."""
+    arrays = [points for piece in pieces if len(points := np.asarray(piece["vertices"]))]
+    if not arrays:
+        return (0.0, 0.0, 0.0)
+    # Per column: numpy's min(axis=0) of three columns takes twenty times as long.
+    low, high = ([[end(column) for column in points.T] for points in arrays] for end in (np.min, np.max))
+    return far_center(np.min(low, axis=0), np.max(high, axis=0))
+
+
+def _meshes(path: Path, parts: dict[str, Any], normals: Normals, center: Vector) -> list[Mesh]:
+    """Build meshes from trimesh's keyword arguments for one mesh or for several."""
+    pieces = _pieces(path, parts)
     if not pieces:
         raise SceneError("contains no triangles (points and lines are ignored); export a triangle mesh")
     meshes, problems = [], []
     for name, piece in pieces.items():
         try:
-            meshes.append(_mesh(path, str(name), piece, normals))
+            meshes.append(_mesh(path, str(name), piece, normals, center))
         except SceneError as error:
             problems += error.problems
     if problems:
@@ -161,9 +180,10 @@ def _placed(
     return shown((by_name[name], matrix) for name, matrix in places if name in by_name)
 
 
-def _mesh(path: Path, name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
-    """Build one mesh from trimesh's arrays, with its indices validated before use."""
-    vertices = np.ascontiguousarray(piece["vertices"], np.float32)
+def _mesh(path: Path, name: str, piece: dict[str, Any], normals: Normals, center: Vector) -> Mesh:
+    """Build one mesh from trimesh's arrays minus `center`, with its indices validated before use."""
+    points = np.subtract(piece["vertices"], center, dtype=np.float64) if any(center) else piece["vertices"]
+    vertices = np.ascontiguousarray(points, np.float32)
     stored = piece.get("vertex_normals")
     stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
     uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))

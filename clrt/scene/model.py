@@ -101,6 +101,7 @@ class Model:
       used; left_out: what is not rendered, and why
     - up, unit: which of the file's axes points up, and the unit of its lengths
     - converted_from: the unit of the lights in the file, if it was guessed and they were converted
+    - center: the model's origin in the file, of one that is far from the file's origin; else (0, 0, 0)
     """
 
     meshes: list[Mesh]
@@ -114,6 +115,7 @@ class Model:
     up: Axis = "y"
     unit: Unit = "m"
     converted_from: LightUnit | None = None
+    center: Vector = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

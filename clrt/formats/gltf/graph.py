@@ -12,22 +12,24 @@ from ...scene.geometry.transform import Matrix, quaternion, scaling, translation
 from . import schema as gltf
 
 Placed = tuple[gltf.Node, Matrix]
+IDENTITY: Matrix = np.eye(4)
 
 
 class NodeGraph:
     """Visible nodes of one of the document's scenes: `placed`, depth first, each with its matrix to the world.
 
-    Without nodes each mesh gets the identity. scene: its index; None for the default.
+    Without nodes each mesh is at the root. scene: its index; None for the default; root: the matrix from the file's
+    coordinates to the world.
     """
 
-    def __init__(self, document: gltf.Document, scene: int | None = None) -> None:
-        self._nodes = document.nodes
+    def __init__(self, document: gltf.Document, scene: int | None = None, root: Matrix = IDENTITY) -> None:
+        self._nodes, self._root = document.nodes, root
         self._worlds: dict[int, Matrix] = {}
         self.placed: list[Placed] = list(self._shown(document, document.scene or 0 if scene is None else scene))
 
     def _shown(self, document: gltf.Document, scene: int) -> Iterator[Placed]:
         if not self._nodes:
-            yield from ((gltf.Node(mesh=index), np.eye(4)) for index in range(len(document.meshes)))
+            yield from ((gltf.Node(mesh=index), self._root) for index in range(len(document.meshes)))
         elif document.scenes:
             yield from self._below(gltf.entry(document.scenes, scene, "scene", "the file").nodes)
         else:
@@ -35,7 +37,7 @@ class NodeGraph:
             yield from self._below([index for index in range(len(self._nodes)) if index not in children])
 
     def _below(self, roots: list[int]) -> Iterator[Placed]:
-        waiting = [(index, np.eye(4)) for index in reversed(roots)]
+        waiting = [(index, self._root) for index in reversed(roots)]
         while waiting:
             index, parent = waiting.pop()
             if index in self._worlds:
@@ -58,7 +60,7 @@ class NodeGraph:
             if index not in self._parents:
                 break
             index = self._parents[index]
-        matrix = self._worlds.get(index, np.eye(4))
+        matrix = self._worlds.get(index, self._root)
         for below in reversed(path):
             matrix = self._worlds[below] = matrix @ _local(self._nodes[below], below)
         return matrix

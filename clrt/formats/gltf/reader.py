@@ -19,10 +19,11 @@ from ...errors import SceneError
 from ...scene.animation import ModelAnimation
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals
-from ...scene.geometry.transform import Matrix
+from ...scene.geometry.transform import Matrix, translation
 from ...scene.model import Mesh, Model
 from ...scene.model_pose import own_materials
 from ...scene.validation.validate import mesh_problems
+from ..far_origin import far_center
 from ..frame_model import bounds
 from ..model_choice import DEFAULT, ModelChoice, chosen
 from ..placed_meshes import shown
@@ -82,7 +83,7 @@ class GltfFile:
         self._materials = Materials(self._data, variant)
         self._primitives = Primitives(self._data, self._materials, normals)
         self._shapes: dict[Shape, Mesh] = {}
-        self._unit = choice.light_unit
+        self._unit, self._center = choice.light_unit, (0.0, 0.0, 0.0)
         #: Bounding box of the last pose that shows anything.
         self._box: NDArray[np.float64] | None = None
 
@@ -90,7 +91,12 @@ class GltfFile:
         """Return the model as chosen, with its animation, and log what is left out."""
         clip, name, left_out = self._clip()
         asked = clip if self._choice.animated else None
-        model, cameras = self._posed(asked, self._choice.time or 0.0)
+        time = self._choice.time or 0.0
+        model, cameras = self._posed(asked, time)
+        assert self._box is not None  # _posed raises an error otherwise
+        if any(center := far_center(*self._box)):
+            self._center = center
+            model, cameras = self._posed(asked, time)
         model.contents = self._contents([*left_out, *cameras, *(asked.ignored if asked else [])])
         if model.lights and self._choice.light_unit is None and self._unit != "radiometric":
             model.converted_from = self._unit
@@ -121,7 +127,8 @@ class GltfFile:
     def _posed(self, clip: Clip | None, time: float) -> tuple[Model, list[str]]:
         """Return the model at a time of an animation, or without one, and descriptions of cameras that are left out."""
         document = self._data.document if clip is None else clip.posed(self._data.document, time)
-        graph = NodeGraph(document, self._scene)
+        x, y, z = self._center
+        graph = NodeGraph(document, self._scene, translation((-x, -y, -z)))
         places = list(self._places(graph, document))
         meshes, instances = shown(places)
         every = [*meshes, *meshes_by_id(instances).values()]
@@ -137,7 +144,8 @@ class GltfFile:
         lights = list(read_lights(document, graph.placed))
         self._unit = self._unit or guess_unit(lights, str(document.asset.generator), box)
         lights = [to_radiometric(light, self._unit) for light in lights]
-        return Model(meshes=meshes, instances=instances, cameras=cameras, lights=lights), left_out
+        model = Model(meshes=meshes, instances=instances, cameras=cameras, lights=lights, center=self._center)
+        return model, left_out
 
     def _places(self, graph: NodeGraph, document: gltf.Document) -> Iterator[tuple[Mesh, Matrix]]:
         """Yield the meshes of all nodes with their matrices.

@@ -18,6 +18,7 @@ from ..models import read_model
 from ..ply.mesh_attributes import Attributes, mesh_with_attributes
 from ..scene_parts.notes import Notes, UnsupportedError
 from ..scene_parts.spheres import inside_out, sphere_at
+from ..toml.instance_table import placed
 from .bsdfs import absorbing
 from .materials import MaterialReader, ShapeMaterial
 from .primitives import cube, cylinder, disk, rectangle, sphere
@@ -207,7 +208,7 @@ def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attribute
     if plugin.kind == "serialized":
         mesh, flat_itself = read_serialized(path, plugin.value("shape_index", int, 0))
         own, flat = (mesh, {}), flat or flat_itself
-    for mesh, attributes in [own] if own else [(mesh, {}) for mesh in read_model(path).meshes]:
+    for mesh, attributes in [own] if own else [(mesh, {}) for mesh in _in_file(path)]:
         if mesh.uv is not None and downward != (own is None):
             mesh.uv[:, 1] = 1 - mesh.uv[:, 1]
         mesh.colors, mesh.tangents = None, None
@@ -218,6 +219,11 @@ def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attribute
         if not flat and mesh.normals is None:
             mesh.normals = smooth_normals(mesh.vertices, mesh.faces)
         yield mesh, attributes
+
+
+def _in_file(path: Path) -> list[Mesh]:
+    """Return a model's meshes in the file's coordinates."""
+    return placed(read_model(path), np.eye(4), None, {}).meshes
 
 
 def _dressed(mesh: Mesh, look: ShapeMaterial, attributes: Attributes, plugin: Plugin) -> Mesh:

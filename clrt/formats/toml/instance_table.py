@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...scene.fields.limits import Ge, Le
-from ...scene.geometry.transform import Matrix, transform_camera, transform_faults, transform_light, transform_mesh
+from ...scene.geometry.transform import (
+    Matrix,
+    transform_camera,
+    transform_faults,
+    transform_light,
+    transform_mesh,
+    translation,
+)
 from ...scene.materials.material_types import Material
 from ...scene.model import Instance, Model
 from ...scene.validation.field_types import show, unknown
@@ -114,7 +121,8 @@ def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray
 
 def placed(model: Model, matrix: Matrix, material: Material | None, others: dict[str, Material]) -> Model:
     """Apply an affine matrix to a model, without its animation. material: replaces its own; others: replacements by
-    their own names."""
+    their own names. The result's coordinates are the file's, as the matrix transforms them, and its center is 0."""
+    matrix = matrix @ translation(model.center)
     meshes = [
         transform_mesh(replace(mesh, material=others.get(mesh.material_name, material or mesh.material)), matrix)
         for mesh in model.meshes
@@ -127,7 +135,14 @@ def placed(model: Model, matrix: Matrix, material: Material | None, others: dict
     lights = [transform_light(light, matrix) for light in model.lights]
     emitters = [transform_mesh(mesh, matrix) for mesh in model.emitters]
     return replace(
-        model, meshes=meshes, instances=instances, cameras=cameras, lights=lights, emitters=emitters, animation=None
+        model,
+        meshes=meshes,
+        instances=instances,
+        cameras=cameras,
+        lights=lights,
+        emitters=emitters,
+        animation=None,
+        center=(0.0, 0.0, 0.0),
     )
 
 

@@ -23,11 +23,12 @@ from ...file_names import printable
 from ...scene.animation import ModelAnimation
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals
-from ...scene.geometry.transform import Matrix, scaling
-from ...scene.model import Mesh, Model
+from ...scene.geometry.transform import Matrix, scaling, translation
+from ...scene.model import Mesh, Model, Vector
 from ...scene.validation.validate import mesh_problems
 from ..archives import check_archive
 from ..decoder import decode
+from ..far_origin import far_center
 from ..frame_model import bounds
 from ..model_choice import DEFAULT, ModelChoice, chosen
 from ..placed_meshes import shown
@@ -72,13 +73,16 @@ def _named(path: Path) -> Iterator[None]:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
 
-def _pose(path: Path, normals: Normals, seconds: float) -> Model:
+def _pose(path: Path, normals: Normals, center: Vector, seconds: float) -> Model:
     with _named(path):
-        return _posed(path, normals, seconds)[0]
+        return _posed(path, normals, seconds, center)[0]
 
 
-def _posed(path: Path, normals: Normals, time: float | None) -> tuple[Model, list[str], ModelAnimation | None]:
-    """Return the model at a time, what is ignored, and its animation, if it has one."""
+def _posed(
+    path: Path, normals: Normals, time: float | None, center: Vector | None = None
+) -> tuple[Model, list[str], ModelAnimation | None]:
+    """Return the model at a time, what is ignored, and its animation, if it has one. center: see `Model`; by default
+    that of this pose."""
     arrays, facts = _content(path, time)
     for layer in facts["layers"]:
         note_read(Path(layer))
@@ -88,6 +92,10 @@ def _posed(path: Path, normals: Normals, time: float | None) -> tuple[Model, lis
     meshes, instances = shown(_places(arrays, shapes, to_scene))
     if not meshes and not instances:
         raise SceneError("its stage contains no triangles that are visible; export a model with meshes")
+    center = far_center(*bounds(meshes, instances)) if center is None else center
+    if any(center):
+        to_scene = translation((-center[0], -center[1], -center[2])) @ to_scene
+        meshes, instances = shown(_places(arrays, shapes, to_scene))
     problems = [
         problem for mesh in (*meshes, *meshes_by_id(instances).values()) for problem in mesh_problems(mesh, "mesh")
     ]
@@ -105,8 +113,9 @@ def _posed(path: Path, normals: Normals, time: float | None) -> tuple[Model, lis
         emitters=lights.emitters,
         environment=lights.environment,
         contents={"animations": [ANIMATION] if facts["seconds"] else []},
+        center=center,
     )
-    pose = partial(_pose, path, normals)
+    pose = partial(_pose, path, normals, center)
     base = replace(model, meshes=list(meshes), instances=list(instances), lights=list(lights.lights))
     animation = ModelAnimation(name=ANIMATION, seconds=facts["seconds"], base=base, pose=pose, fps=facts["fps"])
     ignored = [*ignored, *materials.ignored, *lights.ignored, *no_cameras]
