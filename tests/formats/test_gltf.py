@@ -281,6 +281,54 @@ def test_draco(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
         read(gltf, tmp_path)
 
 
+@pytest.mark.parametrize("dtype", ["<u1", "<u2"])
+def test_draco_integers(dtype: str, tmp_path: Path) -> None:
+    """Colors, weights and joints of every integer type that a primitive may have are those without compression."""
+    import DracoPy
+
+    rng = np.random.default_rng(8)
+    most = np.iinfo(dtype).max
+    colors = rng.integers(0, most + 1, (len(VERTICES), 4)).astype(dtype)
+    joints = rng.integers(0, 2, (len(VERTICES), 4)).astype(dtype)
+    weights = np.zeros((len(VERTICES), 4), dtype)
+    weights[:, 0] = rng.integers(1, most, len(VERTICES))
+    weights[:, 1] = most - weights[:, 0]
+    given = {"COLOR_0": (colors, True), "JOINTS_0": (joints, False), "WEIGHTS_0": (weights, True)}
+
+    def written(compress: bool) -> Gltf:
+        gltf = Gltf()
+        attributes = {"POSITION": gltf.accessor(VERTICES)}
+        for name, (values, normalized) in given.items():
+            attributes[name] = gltf.accessor(values, dtype, normalized=normalized)
+        gltf.mesh(attributes=attributes, indices=gltf.accessor(FACES.ravel(), "<u2"), material=0)
+        gltf.document["materials"] = [{"alphaMode": "BLEND"}]
+        gltf.document["nodes"][0]["skin"] = 0
+        gltf.document["skins"] = [{"joints": [gltf.node(), gltf.node(translation=[0, 0, 9])]}]
+        if compress:
+            numbers = {name: 10 + number for number, name in enumerate(given)}
+            arrays = {numbers[name]: values for name, (values, _) in given.items()}
+            content = DracoPy.encode(
+                VERTICES, FACES.astype(np.uint32), 20, 1, preserve_order=True, generic_attributes=arrays
+            )
+            places = {each["attribute_type"]: each["unique_id"] for each in DracoPy.decode(content).attributes}
+            gltf.document["meshes"][0]["primitives"][0]["extensions"] = {
+                "KHR_draco_mesh_compression": {
+                    "bufferView": gltf.view(content),
+                    "attributes": numbers | {"POSITION": places[0]},
+                }
+            }
+            count = len(DracoPy.decode(content).points)
+            for accessor in gltf.document["accessors"][:-1]:
+                accessor["count"] = count
+        return gltf
+
+    (plain,), (packed,) = (read(written(compress), tmp_path).meshes for compress in (False, True))
+    assert plain.colors is not None and packed.colors is not None
+    np.testing.assert_allclose(packed.vertices[packed.faces], plain.vertices[plain.faces], atol=1e-5)
+    np.testing.assert_array_equal(packed.colors[packed.faces], plain.colors[plain.faces])
+    np.testing.assert_allclose(plain.colors[plain.faces], colors[FACES] / most, rtol=1e-6)
+
+
 def test_draco_without_its_decoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The error says what to install; an uncompressed copy is used if there is one."""
     gltf = compressed()

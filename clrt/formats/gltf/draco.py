@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
+import numpy as np
+
 from ...errors import SceneError
 from ..decoder import decode
 from . import schema as gltf
-from .accessors import GltfData
+from .accessors import DTYPES, Array, GltfData
 
 
 def decompress(data: GltfData, primitive: gltf.Primitive, user: str) -> None:
@@ -45,4 +47,10 @@ def decompress(data: GltfData, primitive: gltf.Primitive, user: str) -> None:
                 f"{user}: accessor {accessor} has {described.count} elements, but the Draco data {count}; "
                 "export it again"
             )
-        data.decoded[accessor] = values
+        data.decoded[accessor] = _as_described(values, described)
+
+
+def _as_described(values: Array, accessor: gltf.Accessor) -> Array:
+    """Return decoded integers, which may be 32 bits wide, with the accessor's component type: its largest value is 1 in
+    normalized ones."""
+    return values.astype(DTYPES[accessor.componentType]) if np.issubdtype(values.dtype, np.integer) else values
