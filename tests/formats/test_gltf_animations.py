@@ -253,6 +253,8 @@ def broken(where: str, value: Any) -> Gltf:
         ("interpolation", "CUBIC", 'its interpolation is "CUBIC"; write one of LINEAR, STEP, CUBICSPLINE'),
         ("interpolation", 0, 'its interpolation is "0"; write one of LINEAR, STEP, CUBICSPLINE'),
         ("interpolation", "CUBICSPLINE", 'animation "walk", rotation of node 0: has 2 values for 2 times'),
+        ("input", -1, "animations[0].samplers[1].input: Input should be greater than or equal to 0"),
+        ("sampler", None, "animations[0].channels[1].sampler: Input should be a valid integer"),
         ("input", np.array([2.0, 1.0]), "its times do not ascend"),
         ("input", np.array([0.0, np.nan]), "its times do not ascend"),
         ("input", np.array([0.0, 1, 2]), "has 2 values for 3 times"),

@@ -11,6 +11,7 @@ import numpy as np
 from ...errors import ClrtError, SceneError
 from ...formats.gltf.accessors import GltfData
 from ...formats.gltf.animations import animation_names
+from ...formats.gltf.schema import parse_animation
 from ...formats.model_choice import ModelChoice
 from ...formats.models import read_model
 from ...scene.geometry.instancing import baked
@@ -51,7 +52,11 @@ def judge(file: Path, count: int, peers: Mapping[str, Poser]) -> Iterator[Judged
         yield Judged(file.name, problem=error.problems[0])
         return
     for number, name in enumerate(animation_names(data.document)):
-        keys = _keyframes(data, number, count)
+        try:
+            keys = _keyframes(data, number, count)
+        except SceneError as error:
+            yield Judged(file.name, name, problem=error.problems[0])
+            continue
         between = np.random.default_rng(number).uniform(keys.min(), keys.max(), len(keys) // 2)
         for peer, poser in peers.items():
             times = keys if peer in AT_KEYS else np.concatenate([keys[::2], between])
@@ -63,7 +68,7 @@ def judge(file: Path, count: int, peers: Mapping[str, Poser]) -> Iterator[Judged
 
 def _keyframes(data: GltfData, animation: int, count: int) -> Doubles:
     """Return up to `count` keyframe times, evenly chosen from those that the most channels share."""
-    source = data.document.animations[animation]
+    source = parse_animation(data.document, animation)
     tracks = [data.array(source.samplers[each.sampler].input, "SCALAR", "a sampler")[:, 0] for each in source.channels]
     times, shared = np.unique(np.concatenate([np.unique(track) for track in tracks]), return_counts=True)
     best = times[shared == shared.max()].astype(np.float64)

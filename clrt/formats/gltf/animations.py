@@ -67,7 +67,7 @@ class Clip:
 
     def __init__(self, data: GltfData, index: int) -> None:
         document = data.document
-        source = document.animations[index]
+        source = gltf.parse_animation(document, index)
         name = f'animation "{animation_names(document)[index]}"'
         self.ignored: list[str] = []
         self._tracks: list[Track] = []
@@ -114,7 +114,8 @@ class Clip:
 
 def animation_names(document: gltf.Document) -> list[str]:
     """Return a unique name for each animation."""
-    return gltf.unique_names("animation", [animation.name for animation in document.animations])
+    names = [animation.get("name") for animation in document.animations]
+    return gltf.unique_names("animation", [name if isinstance(name, str) else None for name in names])
 
 
 def _target(target: gltf.AnimationTarget) -> tuple[int | None, str]:

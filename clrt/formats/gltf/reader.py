@@ -118,7 +118,7 @@ class GltfFile:
         except SceneError as error:
             if self._choice.animated:
                 raise
-            return None, "", [f"an animation: {error}"]
+            return None, "", [f"an animation: {error.problems[0]}"]
 
     def _at(self, clip: Clip, time: float) -> Model:
         with _named(self._path):

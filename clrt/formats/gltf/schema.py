@@ -272,7 +272,6 @@ class AnimationSampler(Part):
 class Animation(Part):
     channels: list[AnimationChannel]
     samplers: list[AnimationSampler]
-    name: str | None = None
 
 
 class Scene(Part):
@@ -287,7 +286,8 @@ class Document(Part):
     extensionsRequired: list[str] = []
     extensionsUsed: list[str] = []
     accessors: list[Accessor] = []
-    animations: list[Animation] = []
+    #: As stored; see `parse_animation`.
+    animations: list[dict[str, object]] = []
     buffers: list[Buffer] = []
     bufferViews: list[BufferView] = []
     cameras: list[Camera] = []
@@ -309,10 +309,7 @@ def parse_document(text: bytes, ignored: Collection[str] = ()) -> Document:
     try:
         document = Document.model_validate_json(text.removeprefix(BOM))
     except ValidationError as error:
-        details = error.errors(include_url=False)
-        raise SceneError(
-            [f"{_path(detail['loc'])}: {detail['msg']}; export the file again" for detail in details[:12]]
-        ) from None
+        raise SceneError(_problems(error)) from None
     if not document.asset.version.startswith("2."):
         raise SceneError(f'asset.version is "{document.asset.version}"; only glTF 2 is supported, export it as 2.0')
     unknown = sorted(set(document.extensionsRequired) - EXTENSIONS - set(ignored))
@@ -324,6 +321,14 @@ def parse_document(text: bytes, ignored: Collection[str] = ()) -> Document:
             f"supported ({options}; in a scene file ignore_extensions)"
         )
     return document
+
+
+def parse_animation(document: Document, index: int) -> Animation:
+    """Parse an animation, which a still does not need. Raises SceneError with its faults, as `parse_document` does."""
+    try:
+        return Animation.model_validate(document.animations[index])
+    except ValidationError as error:
+        raise SceneError(_problems(error, ("animations", index))) from None
 
 
 def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
@@ -340,6 +345,12 @@ def unique_names(kind: str, names: Sequence[str | None]) -> list[str]:
     for index, name in enumerate(names):
         unique[free_name(name or f"{kind} {index}", unique, numbers)] = None
     return list(unique)
+
+
+def _problems(error: ValidationError, parent: tuple[int | str, ...] = ()) -> list[str]:
+    """Return messages for the first faults of what is stored at `parent` in the document."""
+    details = error.errors(include_url=False)
+    return [f"{_path((*parent, *detail['loc']))}: {detail['msg']}; export the file again" for detail in details[:12]]
 
 
 def _path(location: tuple[int | str, ...]) -> str:
