@@ -11,10 +11,11 @@ static inline real ggx_d(real3 h, real alpha) {
     return a2 / (PI * s * s);
 }
 
-// Smith's Lambda for GGX; G1 = 1/(1 + Lambda).
+// Smith's Lambda for GGX, (sqrt(1 + s2/z2) − 1)/2 without cancellation, and without overflow where z2 underflows; G1 =
+// 1/(1 + Lambda).
 static inline real ggx_lambda(real3 w, real alpha) {
-    real t = alpha * alpha * (w.x * w.x + w.y * w.y) / (w.z * w.z);
-    return 0.5f * t / (1.0f + sqrt(1.0f + t));   // (sqrt(1 + t) − 1)/2 without cancellation
+    real s2 = alpha * alpha * (w.x * w.x + w.y * w.y), z2 = w.z * w.z;
+    return 0.5f * s2 / (z2 + absolute(w.z) * sqrt(z2 + s2));
 }
 
 // Sample a normal visible from wo: stretch, sample the spherical cap, unstretch.

@@ -116,6 +116,18 @@ def test_below_the_horizon_nothing_is_reflected(every: Bsdfs) -> None:
         assert not every.value(which, wo, wi)[1].any(), material
 
 
+@pytest.mark.parametrize("end", ["wi", "wo"])
+def test_values_at_grazing_angles(every: Bsdfs, end: str) -> None:
+    """They and the densities stay finite, down to cosines that are only the rounding of a dot product."""
+    cosines = 10.0 ** -np.arange(1, 31)
+    grazing = np.column_stack([np.sqrt(1 - cosines**2), np.zeros_like(cosines), cosines])
+    steep = np.broadcast_to([-0.48, 0.36, 0.8], grazing.shape)
+    wo, wi = (steep, grazing) if end == "wi" else (grazing, steep)
+    for which, material in enumerate(every.materials):
+        value, pdf = every.value(which, wo, wi)
+        assert np.isfinite(value).all() and np.isfinite(pdf).all(), material
+
+
 def test_the_others_of_a_scene_change_nothing(device: Device) -> None:
     """Values of a few materials are the same as in a program compiled for many."""
     seed, (wo, wi) = todays_seed(), (above(300, 7), above(300, 8))
