@@ -19,7 +19,7 @@ from clrt.scene.model import Scene, Vector
 from ..scene.shapes import icosphere
 from .glb import Gltf
 from .test_gltf_skins import Skinned
-from .usd_files import mesh as square, usda
+from .usd_files import animated, mesh as square, usda
 
 #: WGS 84's equatorial radius, and digits that float32 does not have there.
 PLACE = (6378137.3, -312345.7, 4987654.6)
@@ -96,6 +96,17 @@ def usd(folder: Path, place: Vector) -> Path:
     return usda(folder, content, up="Z")
 
 
+def turning_usd(folder: Path, place: Vector) -> Path:
+    """A square that turns by a quarter."""
+    pytest.importorskip("pxr")
+    moved = f'double3 xformOp:translate = {place}\nuniform token[] xformOpOrder = ["xformOp:translate"]\n'
+    turned = "double xformOp:rotateY.timeSamples = { 12: 0, 36: 90 }\n"
+    inner = f'{turned}uniform token[] xformOpOrder = ["xformOp:rotateY"]\n'
+    path = folder / "a.usda"
+    path.write_text(animated(f'def Xform "site" {{ {moved} {square(inner)} }}\n'))
+    return path
+
+
 WRITERS: list[Callable[[Path, Vector], Path]] = [gltf, turning, skinned, obj, ply, usd]
 
 
@@ -142,11 +153,12 @@ def test_scene_file(write: Callable[[Path, Vector], Path], tmp_path: Path, caplo
     np.testing.assert_allclose(load(scene).meshes[0].vertices, expected, rtol=2**-23)
 
 
-def test_animation(tmp_path: Path) -> None:
+@pytest.mark.parametrize("write", [turning, turning_usd])
+def test_animation(write: Callable[[Path, Vector], Path], tmp_path: Path) -> None:
     """Every pose of an animation is moved alike."""
     poses = []
     for place in (ORIGIN, PLACE):
-        animation = load(turning(tmp_path, place)).animation
+        animation = load(write(tmp_path, place)).animation
         assert animation is not None and hasattr(animation, "pose")
         poses.append([animation.pose(seconds).meshes[0].vertices for seconds in (0.0, 0.3, 1.0)])
     near, far = (np.array(each, np.float64) for each in poses)
