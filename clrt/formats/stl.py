@@ -18,9 +18,10 @@ from ..errors import SceneError
 from ..file_names import printable
 from ..scene.editing import free_name
 from ..threads import in_parallel
+from .digit_words import padded
 from .referenced_files import name_of
 from .seams import PLAIN
-from .text_numbers import floats, padded, reuse_memory
+from .text_numbers import floats, reuse_memory
 
 log = logging.getLogger(__name__)
 #: Sizes in bytes of a binary file's header with the number of facets, and of a facet: normal, corners, attribute.

@@ -1,8 +1,4 @@
-"""Numbers in text files, parsed in array operations: eight digits at a time, as the bytes of a 64-bit word.
-
-Method: D. Lemire, "Quickly parsing eight digits", 2018, and W. D. Clinger, "How to read floating point numbers
-accurately", 1990. Words that are not plain decimals are left to Python.
-"""
+"""Numbers in text files, parsed in array operations. Words that are not plain decimals are left to Python."""
 
 from __future__ import annotations
 
@@ -11,25 +7,25 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..threads import in_parallel
+from .digit_words import (
+    DIGITS,
+    EXACT_POWER,
+    POWERS,
+    Bytes,
+    Flags,
+    Floats,
+    Ints,
+    digits,
+    padded,
+    runs,
+    scaled,
+)
+from .regular_numbers import decimals, fields
 
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-
-#: Most digits of a number that are parsed here, in three words of 8 bytes; thus the number of spaces around a text.
-DIGITS, MARGIN = 19, 24
-#: Integers below this, and powers of ten up to this one, are float64 values, so that one division rounds correctly.
-EXACT_INTEGER, EXACT_POWER = 1 << 53, 22
 #: Bytes that are parsed at a time.
 BLOCK = 1 << 20
-POWERS = np.array([10**power for power in range(DIGITS + 1)], np.uint64)
-#: Steps that join neighboring digits, then pairs and groups of four: the distance in bits, and the bits of the results.
-PAIRS = ((8, 0x00FF00FF00FF00FF), (16, 0x0000FFFF0000FFFF), (32, 0x00000000FFFFFFFF))
-FLOAT_POWERS = 10.0 ** np.arange(EXACT_POWER + 1)
 #: What C libraries print for undefined and infinite values, beyond what `float` accepts.
 NAN, INFINITE = re.compile(rb"[-+]?(nan|1\.#(ind|qnan|snan))"), re.compile(rb"[-+]?1\.#inf")
 
@@ -70,6 +66,8 @@ def _blocks(text: bytes) -> Iterator[tuple[int, int]]:
 
 def _block(block: bytes) -> TextNumbers:
     text = padded(block)
+    if (alike := fields(text, text <= ord(" "))) and (found := decimals(text, *alike[:2])) is not None:
+        return TextNumbers(found, np.full(len(found) // len(alike.separators), len(alike.separators)), "")
     values, starts, malformed = floats(text)
     counts = per_line(text, starts)
     counts, word = counts[counts > 0], ""
@@ -77,25 +75,6 @@ def _block(block: bytes) -> TextNumbers:
         values, place = values[: malformed[0]], int(starts[malformed[0]])
         word = text[place:].tobytes().split(None, 1)[0][:60].decode("utf-8", "backslashreplace")
     return TextNumbers(values, counts, word)
-
-
-def padded(text: bytes) -> Bytes:
-    """Return lines of text as a writable array, between MARGIN spaces; a missing last line break is added."""
-    margin = b" " * MARGIN
-    end = b"" if not text or text.endswith(b"\n") else b"\n"
-    return np.frombuffer(bytearray(margin + text + end + margin), np.uint8)
-
-
-def words_at(text: Bytes, places: Ints) -> NDArray[np.uint64]:
-    """Return the eight bytes from each place on, the first one in the lowest bits."""
-    words: NDArray[np.uint64] = np.ndarray((len(text) - 7,), "<u8", text, 0, (1,))
-    return words[places]
-
-
-def runs(mask: Flags) -> tuple[Ints, Ints]:
-    """Return the starts and the ends of the runs of True; the first and the last element must be False."""
-    edges = np.flatnonzero(mask[1:] != mask[:-1]) + 1
-    return edges[::2], edges[1::2]
 
 
 def per_line(text: Bytes, starts: Ints) -> Ints:
@@ -117,29 +96,14 @@ def table(values: Floats, counts: Ints, width: int) -> Floats:
     return np.where(columns < counts[:, None], values[places], np.nan)
 
 
-def digits(text: Bytes, ends: Ints, lengths: Ints) -> tuple[NDArray[np.uint64], Flags]:
-    """Parse runs of at most DIGITS decimal digits: their values, and which of them contain other bytes."""
-    values, strange = np.zeros(len(ends), np.uint64), np.zeros(len(ends), np.uint64)
-    longest = int(lengths.max(initial=0))
-    for done in range(0, min(longest, DIGITS), 8):
-        word = words_at(text, ends - (done + 8))
-        word ^= 0x3030303030303030
-        unwanted = 64 - 8 * (lengths if longest <= 8 else np.clip(lengths - done, 0, 8)).astype(np.uint64)
-        word >>= unwanted
-        word <<= unwanted
-        strange |= (word + 0x7676767676767676) | word
-        for shift, mask in PAIRS:
-            word = word * np.uint64(10 ** (shift >> 3)) + (word >> np.uint64(shift)) & np.uint64(mask)
-        values += word * POWERS[done] if done else word
-    return values, strange & 0x8080808080808080 != 0
-
-
 def floats(text: Bytes) -> tuple[Floats, Ints, Ints]:
     """Parse the words between white space: their values, their starts, and the numbers of those that are malformed.
 
     Values are correctly rounded up to 15 digits, and within one unit of the last place of float64 beyond.
     """
     starts, ends = runs(text > ord(" "))
+    if (values := decimals(text, starts, ends)) is not None:
+        return values, starts, np.zeros(0, np.int64)
     stops, exponents, odd = _exponents(text, starts, ends)
     points = _positions(text == ord("."), starts, stops)
     first = text[starts]
@@ -157,7 +121,7 @@ def floats(text: Bytes) -> tuple[Floats, Ints, Ints]:
     fraction, wrong = digits(text, stops, places)
     odd |= wrong
     mantissas = whole * POWERS.take(places, mode="clip") + fraction
-    values = _scaled(mantissas, np.clip(powers, -EXACT_POWER, EXACT_POWER))
+    values = scaled(mantissas, np.clip(powers, -EXACT_POWER, EXACT_POWER))
     np.negative(values, out=values, where=negative)
     malformed = []
     for number in np.flatnonzero(odd).tolist():
@@ -193,17 +157,6 @@ def _positions(marks: Flags, starts: Ints, stops: Ints) -> Ints:
     inside = where >= starts[word]
     found[word[inside]] = where[inside]
     return found
-
-
-def _scaled(mantissas: NDArray[np.uint64], powers: Ints) -> Floats:
-    """Return mantissas times powers of ten, of −EXACT_POWER to EXACT_POWER."""
-    values, down = mantissas.astype(np.float64), powers <= 0
-    factors = FLOAT_POWERS[abs(powers)]
-    scaled = values / factors if down.all() else np.where(down, values / factors, values * factors)
-    if (long := np.flatnonzero(mantissas >= EXACT_INTEGER)).size:
-        precise, factor = mantissas[long].astype(np.longdouble), factors[long]
-        scaled[long] = np.where(down[long], precise / factor, precise * factor)
-    return scaled
 
 
 def _parse(word: bytes) -> float | None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from clrt.formats.text_numbers import floats, padded, per_line, table
+from clrt.formats.digit_words import padded
+from clrt.formats.text_numbers import floats, per_line, table
 
 FORMATS = ["{!r}", "{:.6f}", "{:g}", "{:.3e}", "{:+.2E}", "{:.0f}.", "{:.18e}", "{:.25f}"]
 numbers = st.one_of(

@@ -7,44 +7,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..used_indices import used_indices
+
 Ints = NDArray[np.int64]
+Indices = NDArray[np.integer[Any]]
 
 
-def distinct(rows: NDArray[np.integer[Any]]) -> tuple[Ints, Ints]:
+def distinct(rows: Indices) -> tuple[Indices, Indices]:
     """Return each row's number, (n,), among the distinct rows, and these, (k, 3), in ascending order.
 
     rows: (n, 3), not negative. In most models nearly all vertices occur in one combination only, found by a table; the
     others are sorted.
     """
-    vertices, vertex = _used(rows[:, 0])
-    others, factor = rows[:, 1].astype(np.int64), int(rows[:, 2].max(initial=0)) + 1
-    pairs = others * factor + rows[:, 2]
-    pair_of = np.zeros(len(vertices), np.int64)
-    pair_of[vertex] = pairs
-    several = np.zeros(len(vertices), np.bool_)
-    several[vertex[pair_of[vertex] != pairs]] = True
+    vertices, vertex = used_indices(rows[:, 0])
+    several, others = np.zeros(len(vertices), np.bool_), list[Indices]()
+    for column in rows.T[1:]:
+        other = np.zeros(len(vertices), column.dtype)
+        other[vertex] = column
+        several[vertex[other[vertex] != column]] = True
+        others.append(other)
+    every = np.stack([vertices, *others], axis=1)
+    if not several.any():
+        return vertex, every
     sorted_rows = np.flatnonzero(several[vertex])
-    found, rank = _distinct_pairs(vertex[sorted_rows], pairs[sorted_rows])
+    number, second, third = vertex[sorted_rows], *rows[sorted_rows, 1:].T.astype(np.int64)
+    factor = int(third.max()) + 1
+    (first, pair), rank = _distinct_pairs(number.astype(np.int64), second * factor + third)
     counts = np.ones(len(vertices), np.int64)
-    counts[several] = np.bincount(found[0], minlength=len(vertices))[several]
+    counts[several] = np.bincount(first, minlength=len(vertices))[several]
     place = np.repeat(np.arange(len(vertices)), counts)
-    pair_of = pair_of[place]
     places_of_several = np.flatnonzero(several[place])
-    pair_of[places_of_several] = found[1]
+    every = every[place]
+    every[places_of_several, 1:] = np.stack([pair // factor, pair % factor], axis=1)
     numbers = (np.cumsum(counts) - counts)[vertex]
     numbers[sorted_rows] = places_of_several[rank]
-    return numbers, np.stack([vertices[place], pair_of // factor, pair_of % factor], axis=1)
-
-
-def _used(indices: NDArray[np.integer[Any]]) -> tuple[Ints, Ints]:
-    """Return the distinct indices, ascending, and the number of each index among them."""
-    least = int(indices.min(initial=0))
-    span = int(indices.max(initial=0)) - least + 1
-    if span > 8 * len(indices):
-        return np.unique(indices, return_inverse=True)
-    used = np.zeros(span, np.bool_)
-    used[indices - least] = True
-    return np.flatnonzero(used) + least, (np.cumsum(used) - 1)[indices - least]
+    return numbers, every
 
 
 def _distinct_pairs(first: Ints, second: Ints) -> tuple[Ints, Ints]:

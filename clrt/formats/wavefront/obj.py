@@ -52,7 +52,7 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
     note_read(path)
     reuse_memory()
     blocks = in_parallel(lambda limits: read_block(path, *limits), block_ranges(path))
-    points, uv, normals = (_joined([block.tables[key] for block in blocks]) for key in TABLES)
+    points, uv, normals = (_joined([block.tables.pop(key) for block in blocks]) for key in TABLES)
     tables = Tables(points[:, :3], uv, normals, _colors(points[:, 3:]))
     used = [name for block in blocks for _, name in block.materials]
     libraries = [name for block in blocks for name in block.libraries]
@@ -73,7 +73,10 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
 
 def _joined(tables: list[Floats]) -> Floats:
     """Return the rows of tables, with NaN in columns that a table does not have."""
-    width = max((table.shape[1] for table in tables), default=3)
+    widths = {table.shape[1] for table in tables if len(table)}
+    if len(widths) == 1:
+        return np.concatenate([table for table in tables if len(table)])
+    width = max(widths, default=3)
     rows = np.full((sum(map(len, tables)), width), np.nan)
     for table, stop in zip(tables, accumulate(map(len, tables))):
         rows[stop - len(table) : stop, : table.shape[1]] = table
@@ -89,7 +92,7 @@ def _colors(given: Floats) -> Floats | None:
 
 def _valid_faces(path: Path, blocks: list[Block], tables: Tables) -> tuple[Corners, Ints]:
     """Return the corners of all valid faces, and how many `usemtl` lines are before each; warn of the others."""
-    counts = np.array([[len(block.tables[key]) for key in TABLES] for block in blocks]).reshape(-1, 3)
+    counts = np.array([block.counts for block in blocks]).reshape(-1, 3)
     corners = _absolute([block.corners for block in blocks], np.cumsum(counts, axis=0) - counts)
     switches, before = [0], 0
     for block in blocks:
@@ -99,9 +102,12 @@ def _valid_faces(path: Path, blocks: list[Block], tables: Tables) -> tuple[Corne
     for column, table in ((1, tables.uv), (2, tables.normals)):
         if not len(table):  # exporters may leave them out, but not the indices
             corners.indices[:, column] = 0
-    wrong = (corners.indices < [1, 0, 0]) | (corners.indices > counts.sum(axis=0))
     faults, bad = [block.fault for block in blocks if block.fault], np.zeros(len(corners.sizes), np.bool_)
-    if wrong.any():
+    limits = (np.array([1, 0, 0]), counts.sum(axis=0))
+    if len(corners.indices) and any(
+        column.min() < least or column.max() > most for column, least, most in zip(corners.indices.T, *limits)
+    ):
+        wrong = (corners.indices < limits[0]) | (corners.indices > limits[1])
         corner, column = np.argwhere(wrong)[0]
         faults.append(_range_fault(int(column), int(corners.indices[corner, column]), int(counts[:, column].sum())))
         bad = np.logical_or.reduceat(wrong.any(axis=1), np.cumsum(corners.sizes) - corners.sizes)
@@ -125,7 +131,8 @@ def _absolute(blocks: list[Corners], before: Ints) -> Corners:
         else:
             indices.append(corners.indices)
     sizes = [np.zeros(0, np.int64), *(corners.sizes for corners in blocks)]
-    return Corners(np.concatenate([np.zeros((0, 3), np.int32), *indices]), None, np.concatenate(sizes))
+    columns = np.concatenate([np.zeros((3, 0), np.int32), *(each.T for each in indices)], axis=1)
+    return Corners(columns.T, None, np.concatenate(sizes))
 
 
 def _range_fault(column: int, index: int, count: int) -> str:

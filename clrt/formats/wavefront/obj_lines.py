@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,22 +14,11 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...file_names import printable
+from ..digit_words import DIGITS, MARGIN, Bytes, Flags, Floats, Ints, digits, padded, runs, words_at
 from ..plain_text import plain_text
-from ..text_numbers import (
-    DIGITS,
-    MARGIN,
-    Bytes,
-    Flags,
-    Floats,
-    Ints,
-    digits,
-    floats,
-    padded,
-    per_line,
-    runs,
-    table,
-    words_at,
-)
+from ..regular_numbers import decimals, fields
+from ..text_numbers import floats, per_line, table
+from .regular_faces import regular_faces
 
 #: Bytes that are parsed at a time.
 BLOCK = 1 << 20
@@ -41,8 +30,9 @@ LARGEST_INDEX = np.iinfo(np.int32).max
 
 
 class Corners(NamedTuple):
-    """Corners of polygons. indices: (n, 3) int32, of vertex, texture coordinates and normal, from 1, or 0 for none.
-    relative: whether they count from the block's first one, (n, 3), or None if none do. sizes: corners per polygon."""
+    """Corners of polygons. indices: (n, 3) int32, of vertex, texture coordinates and normal, from 1, or 0 for none,
+    by column in memory. relative: whether they count from the block's first one, (n, 3), or None if none do. sizes:
+    corners per polygon."""
 
     indices: NDArray[np.int32]
     relative: Flags | None
@@ -51,10 +41,12 @@ class Corners(NamedTuple):
 
 @dataclass
 class Block:
-    """Contents of a block. tables: numbers by key, (n, k), NaN where a line has fewer. bad_faces: those that are
-    malformed; the first one in words. materials: names, each with the number of faces before it."""
+    """Contents of a block. tables: numbers by key, (n, k), NaN where a line has fewer; counts: of their rows.
+    bad_faces: those that are malformed; the first one in words. materials: names, each with the number of faces before
+    it."""
 
     tables: dict[str, Floats]
+    counts: list[int]
     corners: Corners
     bad_faces: int
     fault: str
@@ -83,14 +75,14 @@ def read_block(path: Path, start: int, end: int) -> Block:
     lines = _Lines(text)
     if lines.starting_with("").any():
         lines = _Lines(INDENT.sub(b"", text))
-    tables = {key: _parse_table(lines.numbers(key), key) for key in TABLES}
-    faces = lines.starting_with("f")
-    corners, bad, fault = _parse_faces(lines.numbers("f"), lambda: lines.counts_before(faces))
-    good = faces.astype(np.int64)
-    good[faces] -= bad
+    tables = {key: _parse_table(lines, key) for key in TABLES}
+    corners, bad, fault = _parse_faces(lines)
+    good = lines.starting_with("f").astype(np.int64)
+    good[good > 0] -= bad
     before = np.cumsum(good)
     materials = [(int(before[line]), name) for line, name in lines.named("usemtl")]
-    return Block(tables, corners, int(bad.sum()), fault, materials, [name for _, name in lines.named("mtllib")])
+    counts = list(map(len, tables.values()))
+    return Block(tables, counts, corners, int(bad.sum()), fault, materials, [name for _, name in lines.named("mtllib")])
 
 
 class _Lines:
@@ -108,10 +100,15 @@ class _Lines:
         mask, wanted = (1 << 8 * len(start)) - 1, int.from_bytes(start, "little")
         return np.asarray(self._words & mask == wanted)
 
+    def text(self, key: str) -> Bytes:
+        """Return the lines that start with this word, between margins of any bytes; not to be changed."""
+        return self._extract(np.flatnonzero(self.starting_with(key)))[0]
+
     def numbers(self, key: str) -> Bytes:
         """Return the lines that start with this word, with spaces in place of the word and of comments."""
-        lines = np.flatnonzero(self.starting_with(key))
-        text, starts = self._extract(lines)
+        text, starts = self._extract(np.flatnonzero(self.starting_with(key)))
+        text = text.copy()
+        text[:MARGIN] = text[-MARGIN:] = SPACE
         for letter in range(len(key)):
             text[starts + letter] = SPACE
         if (hashes := text == HASH).any():
@@ -126,8 +123,7 @@ class _Lines:
             return padded(b""), lines
         starts, stops = self._starts[lines], self._ends[lines] + 1
         if lines[-1] - lines[0] + 1 == len(lines):
-            text = self._text[starts[0] - MARGIN : stops[-1] + MARGIN].copy()
-            text[:MARGIN] = text[-MARGIN:] = SPACE
+            text = self._text[starts[0] - MARGIN : stops[-1] + MARGIN]
             return text, starts - (starts[0] - MARGIN)
         chosen = np.zeros(len(self._ends) + 2, np.bool_)
         chosen[lines + 1] = chosen[[0, -1]] = True
@@ -140,16 +136,23 @@ class _Lines:
             rest = self._text[self._starts[line] + len(key) : self._ends[line]].tobytes()
             yield line, rest.decode("utf-8", "surrogateescape").strip()
 
-    def counts_before(self, chosen: Flags) -> Ints:
-        """Return how many lines of each table, (n, 3), come before each of the chosen lines."""
-        return np.stack([np.cumsum(self.starting_with(key))[chosen] for key in TABLES], axis=1)
+    def counts_before(self, key: str) -> Ints:
+        """Return how many lines of each table, (n, 3), come before each of the lines that start with this word."""
+        chosen = self.starting_with(key)
+        return np.stack([np.cumsum(self.starting_with(each))[chosen] for each in TABLES], axis=1)
 
 
-def _parse_table(text: Bytes, key: str) -> Floats:
+def _parse_table(lines: _Lines, key: str) -> Floats:
     """Return the numbers on lines, (n, k), NaN where a line has fewer than k."""
+    least, most = TABLES[key]
+    text = lines.text(key)
+    alike = fields(text, text <= SPACE)
+    if alike is not None and (width := len(alike.separators) - 1) >= least:
+        if (found := decimals(text, *alike.without_first()[:2])) is not None:
+            return found.reshape(-1, width)[:, :most]
+    text = lines.numbers(key)
     values, starts, malformed = floats(text)
     counts = per_line(text, starts)
-    least, most = TABLES[key]
     odd = np.concatenate([np.searchsorted(np.cumsum(counts), malformed, "right"), np.flatnonzero(counts < least)])
     if odd.size:
         line = _line(text, int(odd[0]))
@@ -158,11 +161,12 @@ def _parse_table(text: Bytes, key: str) -> Floats:
     return table(values, counts, int(min(counts.max(initial=least), most)))
 
 
-def _parse_faces(text: Bytes, counts_before: Callable[[], Ints]) -> tuple[Corners, Flags, str]:
-    """Return the corners of the faces, one per line, which lines are malformed, and what is wrong with the first.
-
-    counts_before: returns the numbers of vertices, texture coordinates and normals before each line.
-    """
+def _parse_faces(lines: _Lines) -> tuple[Corners, Flags, str]:
+    """Return the corners of the faces, one per line, which lines are malformed, and what is wrong with the first."""
+    if (alike := regular_faces(lines.text("f"))) is not None:
+        _, count, size = alike.shape
+        return Corners(alike.reshape(3, -1).T, None, np.full(count, size)), np.zeros(count, np.bool_), ""
+    text = lines.numbers("f")
     starts, ends = runs(text - ZERO < 10)
     lengths, heads = ends - starts, starts
     values, _ = digits(text, ends, np.minimum(lengths, DIGITS))
@@ -182,7 +186,8 @@ def _parse_faces(text: Bytes, counts_before: Callable[[], Ints]) -> tuple[Corner
     relative = None
     if (negative := (heads < starts) & (text[starts - 1] == MINUS) & (values > 0)).any():
         relative = _by_corner(negative, slash, columns, odd) > 0
-        indices = np.where(relative, np.repeat(counts_before(), sizes, axis=0) + 1 - indices, indices).astype(np.int32)
+        before = np.repeat(lines.counts_before("f"), sizes, axis=0)
+        indices = np.where(relative, before + 1 - indices, indices).astype(np.int32)
     fault = _fault(text, int(bad.argmax()), no_index) if bad.any() else ""
     return without(bad, Corners(indices, relative, sizes)), bad, fault
 
