@@ -50,7 +50,7 @@ def parse_off(path: Path) -> dict[str, Any]:
     if keyword and (keyword[5] or keyword[6]):
         kind = printable(keyword[0].decode().strip())
         raise SceneError(f'is an OFF file of the kind "{kind}", which is not supported; export it as plain text')
-    values, counts, word = numbers(text[keyword.end() :] if keyword else text)
+    values, counts, word = numbers(text, keyword.end() if keyword else 0)
     if word:
         raise _malformed(f'has "{word}" in place of a number')
     lines = Lines(values, counts)

@@ -52,6 +52,8 @@ def ranges(starts: Ints, counts: Ints) -> Ints:
 
 def fans(sizes: Ints) -> Ints:
     """Return the triangles of each polygon's fan around its first corner, (m, 3)."""
+    if (sizes == 3).all():
+        return np.arange(3 * len(sizes)).reshape(-1, 3)
     first = np.repeat(np.cumsum(sizes) - sizes, sizes - 2)
     step = ranges(np.ones_like(sizes), sizes - 2)
     return np.stack([first, first + step, first + step + 1], axis=1)

@@ -133,7 +133,7 @@ def _digit_words(text: Bytes, stops: Ints, counts: Ints, places: int | None) -> 
         word = words_at(text, stops - 8)
         word ^= ZEROS
         whole = np.uint64((1 << 8 * (8 - places)) - 1)
-        yield last_bytes((word & ~whole) | (word << 8 & whole), np.minimum(counts, 7)), 0
+        yield last_bytes((word & ~whole) | (word << np.uint64(8) & whole), np.minimum(counts, 7)), 0
         if longest > 7:
             yield last_digits(text, stops - 8, np.clip(counts - 7, 0, 8)), 7
     else:

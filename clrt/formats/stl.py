@@ -18,24 +18,25 @@ from ..errors import SceneError
 from ..file_names import printable
 from ..scene.editing import free_name
 from ..threads import in_parallel
-from .digit_words import padded
+from .digit_words import Bytes, Ints, padded, runs, words_at
 from .referenced_files import name_of
 from .seams import PLAIN
-from .text_numbers import floats, reuse_memory
+from .text_numbers import floats_at, reuse_memory
 
 log = logging.getLogger(__name__)
 #: Sizes in bytes of a binary file's header with the number of facets, and of a facet: normal, corners, attribute.
 HEADER, FACET = 84, 50
 #: A text file has a vertex among its first bytes.
 START = 1 << 16
-#: What separates the numbers of a facet, as nearly all programs write it; text of this size fits into caches.
-WORDS = (b"outer loop", b"vertex", b"endloop", b"endfacet")
-#: Number in place of the words that begin a facet, to see that each has a normal and three vertices.
-MARK = 918273645
+#: The words of a facet, as nearly all programs write it; 0 in place of numbers.
+WORDS = b"facet normal 0 0 0 outer loop vertex 0 0 0 vertex 0 0 0 vertex 0 0 0 endloop endfacet".split()
+COORDINATES = [place for place, word in enumerate(WORDS) if word == b"0"][3:]
+#: Bytes that are parsed at a time.
 CHUNK = 1 << 18
 #: A line that begins a solid, up to a facet on the same line.
 _SOLID = re.compile(rb"solid[^\r\n]*?(?=\s+facet\s+normal\s|[\r\n]|\Z)")
-_VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
+#: Programs that print numbers of a fixed width may leave no space before the first one.
+_VERTEX = re.compile(rb"vertex(?:\s+|(?=[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s))(\S+)\s+(\S+)\s+(\S+)")
 
 
 def parse_stl(path: Path) -> dict[str, Any]:
@@ -50,8 +51,8 @@ def parse_stl(path: Path) -> dict[str, Any]:
     if b"vertex" not in content[:START]:
         content = content.lower()
     solids: dict[str, dict[str, Any]] = {}
-    for name, text in _solids(content):
-        if len(corners := _corners(path, text)):
+    for name, limits in _solids(content):
+        if len(corners := _corners(path, content, *limits)):
             solids[free_name(printable(name) or name_of(path), solids)] = _soup(corners)
     return {"geometry": solids, "up": "z"}
 
@@ -98,51 +99,65 @@ def _colors(header: bytes, attributes: NDArray[np.uint16]) -> NDArray[np.float32
     return np.where(own[:, None], colors, plain)
 
 
-def _solids(text: bytes) -> Iterator[tuple[str, bytes]]:
-    """Yield the name of each solid and the text of its facets, also of facets before the first solid."""
+def _solids(text: bytes) -> Iterator[tuple[str, tuple[int, int]]]:
+    """Yield the name of each solid and where the text of its facets starts and stops, also of facets before the first
+    solid."""
     name, start, place = "", 0, 0
-    while (place := text.find(b"solid", place)) >= 0:
+    # Facets have no s, and single bytes are found faster.
+    while (place := text.find(b"s", place)) >= 0 and (place := text.find(b"solid", place)) >= 0:
         is_end = text[max(place - 3, 0) : place] == b"end"
-        yield name, text[start : place - 3 * is_end]
+        yield name, (start, place - 3 * is_end)
         line = _SOLID.match(text, place)
         assert line is not None
         words = b"" if is_end else line[0][len(b"solid") :].strip()
         name, start = words.decode("utf-8", "surrogateescape"), line.end()
         place = start
-    yield name, text[start:]
+    yield name, (start, len(text))
 
 
-def _corners(path: Path, text: bytes) -> NDArray[np.float64]:
+def _corners(path: Path, text: bytes, start: int, stop: int) -> NDArray[np.float32]:
     """Return the corners of a solid's triangles, (3m, 3)."""
     reuse_memory()
-    parts = in_parallel(lambda limits: _regular(path, text[slice(*limits)]), _chunks(text))
-    return np.concatenate([np.zeros((0, 3)), *parts])
+    parts = in_parallel(lambda limits: _regular(path, text[slice(*limits)]), _chunks(text, start, stop))
+    return np.concatenate([np.zeros((0, 3), np.float32), *parts])
 
 
-def _chunks(text: bytes) -> Iterator[tuple[int, int]]:
+def _chunks(text: bytes, start: int, stop: int) -> Iterator[tuple[int, int]]:
     """Yield the start and the stop of pieces of the text that end after a facet."""
-    start = 0
-    while start < len(text):
-        end = text.rfind(b"endfacet", start, start + CHUNK)
-        end = text.find(b"endfacet", start) if end < 0 else end
-        end = len(text) if end < 0 else end + len(b"endfacet")
+    while start < stop:
+        end = text.rfind(b"endfacet", start, min(start + CHUNK, stop))
+        end = text.find(b"endfacet", start, stop) if end < 0 else end
+        end = stop if end < 0 else end + len(b"endfacet")
         yield start, end
         start = end
 
 
-def _regular(path: Path, text: bytes) -> NDArray[np.float64]:
+def _regular(path: Path, text: bytes) -> NDArray[np.float32]:
     """Return the corners in a text of facets, each with a normal and three vertices."""
-    plain = text.replace(b"facet normal", b"%d " % MARK)
-    for word in WORDS:
-        plain = plain.replace(word, b"")
-    values, _, malformed = floats(padded(plain))
-    if malformed.size or len(values) % 13:
+    given = padded(text)
+    starts, ends = runs(given > ord(" "))
+    if len(starts) % len(WORDS):
         return _irregular(path, text)
-    numbers = values.reshape(-1, 13)
-    return numbers[:, 4:].reshape(-1, 3) if np.all(numbers[:, 0] == MARK) else _irregular(path, text)
+    starts, ends = starts.reshape(-1, len(WORDS)), ends.reshape(-1, len(WORDS))
+    for place, word in enumerate(WORDS):
+        if word != b"0" and not _are(word, given, starts[:, place], ends[:, place]):
+            return _irregular(path, text)
+    values, malformed = floats_at(given, starts[:, COORDINATES].ravel(), ends[:, COORDINATES].ravel())
+    return _irregular(path, text) if malformed.size else _single(values).reshape(-1, 3)
 
 
-def _irregular(path: Path, text: bytes) -> NDArray[np.float64]:
+def _are(word: bytes, text: Bytes, starts: Ints, ends: Ints) -> bool:
+    """Return whether this word, of at most eight letters, is at all places."""
+    same = words_at(text, starts) << 64 - 8 * len(word) == int.from_bytes(word, "little") << 64 - 8 * len(word)
+    return bool((same & (ends - starts == len(word))).all())
+
+
+def _single(values: NDArray[np.float64]) -> NDArray[np.float32]:
+    with np.errstate(over="ignore", under="ignore"):  # those that are not finite are reported
+        return values.astype(np.float32)
+
+
+def _irregular(path: Path, text: bytes) -> NDArray[np.float32]:
     """Return the corners in any text: of each facet with three vertices or more, a fan."""
     corners, ignored = list[tuple[float, ...]](), 0
     for facet in text.split(b"endfacet"):
@@ -152,7 +167,7 @@ def _irregular(path: Path, text: bytes) -> NDArray[np.float64]:
             corners += [points[0], second, third]
     if ignored:
         log.warning("%s: ignored: %d facets with fewer than 3 vertices", path, ignored)
-    return np.array(corners, np.float64).reshape(-1, 3)
+    return _single(np.array(corners, np.float64)).reshape(-1, 3)
 
 
 def _point(words: tuple[bytes, ...]) -> tuple[float, ...]:

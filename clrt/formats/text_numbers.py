@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -45,19 +46,34 @@ class TextNumbers(NamedTuple):
     malformed: str
 
 
-def numbers(text: bytes) -> TextNumbers:
-    """Parse a text in blocks, by as many threads as there are cores."""
+def numbers(text: bytes, start: int = 0) -> TextNumbers:
+    """Parse a text from `start` on in blocks, by as many threads as there are cores."""
     reuse_memory()
-    nothing = TextNumbers(np.zeros(0), np.zeros(0, np.int64), "")
-    parsed = [nothing, *in_parallel(lambda limits: _block(text[slice(*limits)]), _blocks(text))]
-    last = next((number for number, block in enumerate(parsed) if block.malformed), len(parsed) - 1)
-    values, counts, words = zip(*parsed[: last + 1])
-    return TextNumbers(np.concatenate(values), np.concatenate(counts), words[-1])
+    blocks = list(_blocks(text, start))
+    ends = list(accumulate(in_parallel(lambda limits: _count_words(text, *limits), blocks), initial=0))
+    values, stops = np.empty(ends[-1]), list(ends)
+
+    def parse(number: int) -> tuple[Ints, str]:
+        block = _block(text[slice(*blocks[number])])
+        stops[number] = ends[number] + len(block.values)
+        values[ends[number] : stops[number]] = block.values
+        return block.counts, block.malformed
+
+    parsed = in_parallel(parse, range(len(blocks)))
+    last = next((number for number, (_, word) in enumerate(parsed) if word), len(parsed) - 1)
+    if last < 0:
+        return TextNumbers(values, np.zeros(0, np.int64), "")
+    counts = np.concatenate([counts for counts, _ in parsed[: last + 1]])
+    return TextNumbers(values[: stops[last]], counts, parsed[last][1])
 
 
-def _blocks(text: bytes) -> Iterator[tuple[int, int]]:
+def _count_words(text: bytes, start: int, stop: int) -> int:
+    in_word = np.frombuffer(text, np.uint8, stop - start, start) > ord(" ")
+    return int(in_word[0]) + int(np.count_nonzero(in_word[1:] > in_word[:-1]))
+
+
+def _blocks(text: bytes, start: int) -> Iterator[tuple[int, int]]:
     """Yield the start and the stop of blocks of whole lines."""
-    start = 0
     while start < len(text):
         stop = text.find(b"\n", start + BLOCK) + 1 or len(text)
         yield start, stop
@@ -97,13 +113,19 @@ def table(values: Floats, counts: Ints, width: int) -> Floats:
 
 
 def floats(text: Bytes) -> tuple[Floats, Ints, Ints]:
-    """Parse the words between white space: their values, their starts, and the numbers of those that are malformed.
+    """Parse the words between white space: their values, their starts, and the numbers of those that are malformed."""
+    starts, ends = runs(text > ord(" "))
+    values, malformed = floats_at(text, starts, ends)
+    return values, starts, malformed
+
+
+def floats_at(text: Bytes, starts: Ints, ends: Ints) -> tuple[Floats, Ints]:
+    """Parse these words: their values, and the numbers of those that are malformed.
 
     Values are correctly rounded up to 15 digits, and within one unit of the last place of float64 beyond.
     """
-    starts, ends = runs(text > ord(" "))
-    if (values := decimals(text, starts, ends)) is not None:
-        return values, starts, np.zeros(0, np.int64)
+    if (same := decimals(text, starts, ends)) is not None:
+        return same, np.zeros(0, np.int64)
     stops, exponents, odd = _exponents(text, starts, ends)
     points = _positions(text == ord("."), starts, stops)
     first = text[starts]
@@ -129,7 +151,7 @@ def floats(text: Bytes) -> tuple[Floats, Ints, Ints]:
         values[number] = np.nan if value is None else value
         if value is None:
             malformed.append(number)
-    return values, starts, np.array(malformed, np.int64)
+    return values, np.array(malformed, np.int64)
 
 
 def _exponents(text: Bytes, starts: Ints, ends: Ints) -> tuple[Ints, Ints, Flags]:

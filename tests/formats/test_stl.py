@@ -87,6 +87,7 @@ ODD: dict[str, Callable[[str], str]] = {
     "no normals": lambda whole: whole.replace("facet normal 0 0 1", "facet"),
     "Windows' NaN": lambda whole: whole.replace("normal 0 0 1", "normal -nan(ind) -1.#IND 1"),
     "a name of keywords": lambda whole: whole.replace("solid a", "solid solid facet vertex endloop"),
+    "no space before signs": lambda whole: whole.replace("vertex 0", "vertex-0"),
     "no name": lambda whole: whole.replace("solid a", "solid"),
 }
 

@@ -16,6 +16,7 @@ from ..text_numbers import numbers
 from .header import Element, Header, Property, parse_header
 
 Array = NDArray[Any]
+Content = bytes | memoryview
 #: numpy's types in the notation of `struct`.
 CODES = {"i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q", "f4": "f", "f8": "d"}
 
@@ -47,14 +48,16 @@ def read_elements(content: bytes, wanted: Collection[str]) -> tuple[Header, dict
     """
     header = parse_header(content)
     elements, start, order = header.elements, header.size, header.orders[0]
+    records: Content = content
     if not order:  # text is read like a binary file of doubles
-        content, start, order = numbers(content[start:].replace(b"\r", b"\n")).values.tobytes(), 0, "="
+        values = numbers(content.replace(b"\r", b"\n"), start).values
+        records, start, order = values.view(np.uint8).data, 0, "="
         elements = [each._replace(properties=list(map(_as_double, each.properties))) for each in elements]
     last = max((i for i, element in enumerate(elements) if element.name in wanted), default=-1)
     found = {}
     for element, given in zip(elements[: last + 1], header.elements):
         try:
-            columns, start = _records(content, start, element, order)
+            columns, start = _records(records, start, element, order)
         except _Truncated as end:
             raise SceneError(
                 f"cannot be read as PLY: it ends or is damaged in {element.name} {end} of {element.number}; "
@@ -68,7 +71,7 @@ def _as_double(given: Property) -> Property:
     return given._replace(kind="f8", count_kind=given.count_kind and "f8")
 
 
-def _records(content: bytes, start: int, element: Element, order: str) -> tuple[Columns, int]:
+def _records(content: Content, start: int, element: Element, order: str) -> tuple[Columns, int]:
     """Return an element's properties, and where the next element starts. Raises _Truncated."""
     if element.number == 0 or not element.properties:
         nothing = np.zeros(0)
@@ -82,7 +85,9 @@ def _records(content: bytes, start: int, element: Element, order: str) -> tuple[
     return _even(content, start, element, order, sizes) or _uneven(content, start, element, order)
 
 
-def _even(content: bytes, start: int, element: Element, order: str, sizes: Sequence[int]) -> tuple[Columns, int] | None:
+def _even(
+    content: Content, start: int, element: Element, order: str, sizes: Sequence[int]
+) -> tuple[Columns, int] | None:
     """Read records whose lists all have the lengths of those in the first record, `sizes`; None for others."""
     lengths = iter(sizes)
     widths = [next(lengths) if each.count_kind else 1 for each in element.properties]
@@ -110,7 +115,7 @@ def _even(content: bytes, start: int, element: Element, order: str, sizes: Seque
     return columns, start + element.number * record
 
 
-def _uneven(content: bytes, start: int, element: Element, order: str) -> tuple[Columns, int]:
+def _uneven(content: Content, start: int, element: Element, order: str) -> tuple[Columns, int]:
     """Read records whose lists have any lengths. Raises _Truncated."""
     place, end = _starts(content, start, element, order)
     columns = Columns(element.number, {}, {})
@@ -128,7 +133,7 @@ def _uneven(content: bytes, start: int, element: Element, order: str) -> tuple[C
     return columns, end
 
 
-def _starts(content: bytes, start: int, element: Element, order: str) -> tuple[NDArray[np.int64], int]:
+def _starts(content: Content, start: int, element: Element, order: str) -> tuple[NDArray[np.int64], int]:
     """Return at which byte each record starts (n,), and at which the last one ends. Raises _Truncated."""
     lists: list[tuple[int, Callable[[int], int], int, int]] = []
     gap = 0
@@ -153,7 +158,7 @@ def _starts(content: bytes, start: int, element: Element, order: str) -> tuple[N
     return np.frombuffer(starts, np.int64), place
 
 
-def _counter(content: bytes, order: str, kind: str) -> Callable[[int], int]:
+def _counter(content: Content, order: str, kind: str) -> Callable[[int], int]:
     """Return a function that reads a list's length at a byte; it may raise IndexError, ValueError and the like."""
     if _size(kind) == 1:
         return content.__getitem__  # also for "char", which some writers mean to be unsigned
@@ -161,7 +166,7 @@ def _counter(content: bytes, order: str, kind: str) -> Callable[[int], int]:
     return lambda place: int(unpack(content, place)[0])
 
 
-def _values(content: bytes, kind: str, offsets: NDArray[np.int64]) -> Array:
+def _values(content: Content, kind: str, offsets: NDArray[np.int64]) -> Array:
     """Return the values of a type that start at these bytes."""
     if len(offsets) == 0:
         return np.zeros(0, kind)

@@ -17,6 +17,7 @@ from ...scene.validation.validate import index_problems
 from ..images.image_reader import read_texels
 from ..referenced_files import find_file, name_of
 from ..seams import with_corner_attributes
+from ..used_indices import used_indices
 from .attributes import Array, colors_of, columns_of, coordinates_of, corner_coordinates
 from .elements import Columns, Lists, read_elements
 from .points import point_spheres
@@ -97,7 +98,7 @@ def _by_texture(path: Path, comments: Sequence[str], whole: dict[str, Any], numb
 
 def _part(whole: dict[str, Any], chosen: Array) -> dict[str, Any]:
     """Return the chosen faces and the vertices that they use."""
-    used, faces = np.unique(whole["faces"][chosen], return_inverse=True)
+    used, faces = used_indices(whole["faces"][chosen].ravel())
     arrays = {name: None if values is None else values[used] for name, values in whole.items() if name != "faces"}
     return {**arrays, "faces": faces.reshape(-1, 3)}
 

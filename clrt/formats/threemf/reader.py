@@ -22,6 +22,7 @@ from ...scene.validation.validate import index_problems
 from ..archives import check_archive
 from ..decoder import decode
 from ..seams import with_corner_attributes
+from ..used_indices import used_indices
 from .properties import Appearance, Properties
 
 log = logging.getLogger(__name__)
@@ -69,11 +70,11 @@ def _pieces(name: str, arrays: dict[str, Array], number: int, properties: Proper
     if problems := index_problems(triangles, len(vertices), f'object "{name}"'):
         raise SceneError(problems)
     for rows, appearance in properties.appearances(arrays[f"properties {number}"]):
-        yield _piece(vertices, triangles[rows].astype(np.int64), appearance)
+        yield _piece(vertices, triangles[rows], appearance)
 
 
 def _piece(vertices: Array, faces: Array, appearance: Appearance) -> dict[str, Any]:
-    used, corners = np.unique(faces, return_inverse=True)
+    used, corners = used_indices(faces.ravel())
     whole = {"vertices": vertices[used], "faces": corners.reshape(-1, 3)}
     corner = {"vertex_colors": appearance.colors, "uv": appearance.uv}
     split = with_corner_attributes(whole, {key: values for key, values in corner.items() if values is not None})

@@ -18,6 +18,7 @@ from ...scene.materials.material_types import Diffuse, Material
 from ...scene.model import Mesh
 from ..polygons import triangulate
 from ..seams import with_corner_attributes
+from ..used_indices import used_indices
 from .materials import DISPLAY_COLOR, Look, Materials
 from .solids import solid
 
@@ -130,7 +131,7 @@ class Shapes:
                 of_corners[key] = np.column_stack([values[:, 0], 1 - values[:, 1]])
         if (normals := self._values(number, facts, "normals", triangles, 3)) is not None:
             of_corners["normals"] = normals
-        used, faces = np.unique(triangles.points[triangles.corners], return_inverse=True)
+        used, faces = used_indices(triangles.points[triangles.corners].ravel())
         whole = {"vertices": points[used], "faces": faces.reshape(-1, 3)}
         split = with_corner_attributes(whole, of_corners)
         material = self._material(look, facts, colors, "colors" in of_corners)
@@ -191,11 +192,13 @@ class Shapes:
         if found is None:
             return None
         values, interpolation = found
-        rows = {
-            "constant": np.zeros(triangles.corners.size, np.int64),
-            "uniform": np.repeat(triangles.faces, 3),
-            "faceVarying": triangles.corners.ravel(),
-        }.get(interpolation, triangles.points[triangles.corners].ravel())
+        if interpolation == "constant":
+            rows = np.zeros(triangles.corners.size, np.int64)
+        elif interpolation == "uniform":
+            rows = np.repeat(triangles.faces, 3)
+        else:
+            rows = triangles.corners.ravel()
+            rows = rows if interpolation == "faceVarying" else triangles.points[rows]
         if values.shape[1] < width or (len(rows) and rows.max() >= len(values)):
             self._note(f"primvars {name} of the wrong size")
             return None
