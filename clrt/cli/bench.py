@@ -12,6 +12,7 @@ from .bench_converge import converge_command
 from .bench_farm import farm_command
 from .bench_floor import floor_command
 from .bench_hits import hits_command
+from .bench_load import load_command
 from .bench_mitsuba_data import mitsuba_data_command
 from .bench_numerics import numerics_command
 from .bench_peers import peers_command
@@ -24,8 +25,8 @@ from .command_group import CommandGroup
 
 @click.group(cls=CommandGroup)
 def command() -> None:
-    """Measure speed and accuracy: rays, build, hits, peers, converge, agree, combinations, floor, blender, poses,
-    mitsuba-data, render-fidelity, numerics, theses, farm."""
+    """Measure speed and accuracy: rays, build, hits, peers, load, converge, agree, combinations, floor,
+    blender, poses, mitsuba-data, render-fidelity, numerics, theses, farm."""
 
 
 for each in (
@@ -33,6 +34,7 @@ for each in (
     build_command,
     hits_command,
     peers_command,
+    load_command,
     converge_command,
     agree_command,
     combinations_command,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..bench.rays.cold_start import peak_bytes
+from ..bench.process_memory import peak_bytes
 from ..rendering.renderer import Renderer, State
 from ..scene.camera_path import frames, turntable
 from ..scene.model import RenderSettings, Scene

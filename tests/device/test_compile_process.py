@@ -25,7 +25,7 @@ import json, sys
 from clrt.accel.device_builder import SHAPES, program_source
 from clrt.device.open import open_device
 from clrt.device.programs.program import build
-from clrt.bench.rays.cold_start import peak_bytes
+from clrt.bench.process_memory import peak_bytes
 
 built = build(open_device(), program_source(SHAPES["bvh8"], True, False, False), int(sys.argv[1]))
 print(json.dumps([peak_bytes(), built.cached, built.program.num_kernels]))

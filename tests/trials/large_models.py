@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from clrt.bench.rays.cold_start import CACHES, peak_bytes
+from clrt.bench.process_memory import peak_bytes
+from clrt.bench.rays.cold_start import CACHES
 from clrt.bench.rays.resize import resized
 from clrt.bench.rays.workloads import bumpy_ball
 

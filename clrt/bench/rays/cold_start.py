@@ -19,6 +19,7 @@ import numpy as np
 
 from ...errors import ClrtError
 from ...queries.mesh import RayQuery
+from ..process_memory import peak_bytes
 from .ray_speed import Rays
 from .workloads import Mesh
 
@@ -63,23 +64,6 @@ def answer(folder: Path) -> None:
         "peak_bytes": peak_bytes(),
     }
     (folder / FIGURES).write_text(json.dumps(figures))
-
-
-def peak_bytes() -> int | None:
-    """Return this process's peak memory; None if the system does not report it.
-
-    On Linux, /proc is more accurate than getrusage, which includes the parent's peak.
-    """
-    try:
-        lines = Path("/proc/self/status").read_text().splitlines()
-        return next(1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM:"))
-    except (OSError, StopIteration):
-        pass
-    try:
-        from resource import RUSAGE_SELF, getrusage
-    except ImportError:
-        return None
-    return getrusage(RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
 if __name__ == "__main__":

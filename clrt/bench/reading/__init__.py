@@ -1,0 +1,1 @@
+"""Speed and memory of reading model files, by clrt and by other programs."""
