@@ -96,7 +96,10 @@ def _with_faces(path: Path, whole: dict[str, Any], lines: Lines) -> dict[str, An
     extra = lines.counts - 1 - sizes
     if np.any(sizes < 0) or np.any(extra < 0):
         raise _malformed("has a face with fewer values than it counts")
-    corners = lines.numbers[ranges(starts + 1, sizes)].astype(np.int64)
+    if len(sizes) and (lines.counts == lines.counts[0]).all() and (sizes == sizes[0]).all():
+        corners = lines.numbers.reshape(len(sizes), -1)[:, 1 : sizes[0] + 1].astype(np.int64).ravel()
+    else:
+        corners = lines.numbers[ranges(starts + 1, sizes)].astype(np.int64)
     triangles = Triangles(Lists(sizes, corners), whole["vertices"])
     if problems := index_problems(triangles.vertices, len(whole["vertices"]), f'mesh "{name_of(path)}"'):
         raise SceneError(problems)
