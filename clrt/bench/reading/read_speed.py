@@ -51,7 +51,10 @@ def _in_new_process(reader: str, path: Path) -> dict[str, Any]:
     )
     lines = (done.stderr if done.returncode else done.stdout).strip().splitlines()
     last = lines[-1] if lines else f"exited with {done.returncode}"
-    return {"error": last} if done.returncode else dict(json.loads(last))
+    if done.returncode:
+        return {"error": last}
+    row: dict[str, Any] = json.loads(last)
+    return row if row["triangles"] else {"error": "reads no triangles"}
 
 
 def _medians(rows: list[dict[str, Any]]) -> dict[str, Any]:
