@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple, Unpack
 
 import numpy as np
@@ -40,6 +40,7 @@ def load(
     light_unit: LightUnit | None = None,
     ignore_extensions: Iterable[str] = (),
     approximate: bool = False,
+    parameters: Mapping[str, str] = {},
 ) -> Scene:
     """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (glTF, USD, OBJ, PLY, STL, OFF or 3MF).
 
@@ -54,7 +55,7 @@ def load(
     suggest. ignore_extensions: names of extensions that the file may require although clrt does not support them.
 
     approximate: of a Mitsuba scene, what clrt lacks is replaced by something similar or left out, with a warning each,
-    instead of an error.
+    instead of an error. parameters: of a Mitsuba scene, values of $NAME in it, which replace its defaults.
 
     Raises SceneError, which lists all problems.
     """
@@ -69,7 +70,7 @@ def load(
         light_unit=light_unit,
         ignore_extensions=given or None,
     )
-    return _load(path, camera, up, unit, choice, approximate=approximate)
+    return _load(path, camera, up, unit, choice, approximate=approximate, parameters=parameters)
 
 
 @listed(RendererOptions, SETTINGS)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, get_args
 
 from ..scene.axes_and_units import Axis, LightUnit, Unit
 from .option_groups import flag
-from .option_types import Finite, OneOf
+from .option_types import Assignment, Finite, OneOf
 
 if TYPE_CHECKING:
     from ..scene.model import Scene
@@ -69,6 +69,15 @@ class LoadOptions:
         help="Replace what clrt lacks of a Mitsuba scene by something similar, or leave it out, with a warning each.",
     )
 
+    parameters: tuple[tuple[str, str], ...] = flag(
+        "-D",
+        "--define",
+        type=Assignment(),
+        multiple=True,
+        default=(),
+        help="Value of a parameter $NAME of a Mitsuba scene, which replaces its default. May be repeated.",
+    )
+
     def load(self, path: Path, moving: bool = False) -> Scene:
         """Load the scene or model. moving: whether its animation is rendered. Raises SceneError."""
         from ..formats.load_scene import load
@@ -82,4 +91,4 @@ class LoadOptions:
             light_unit=self.light_unit,
             ignore_extensions=self.ignore_extensions or None,
         )
-        return load(path, self.camera, self.up, self.unit, choice, moving, self.approximate)
+        return load(path, self.camera, self.up, self.unit, choice, moving, self.approximate, dict(self.parameters))

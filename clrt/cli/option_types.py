@@ -35,6 +35,18 @@ class Pixel(click.ParamType[tuple[int, int]]):
         return int(match[1]), int(match[2])
 
 
+class Assignment(click.ParamType[tuple[str, str]]):
+    """NAME=VALUE."""
+
+    name = "NAME=VALUE"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[str, str]:
+        name, equals, text = str(value).partition("=")
+        if not name or not equals:
+            self.fail(f"{value!r} gives no value; write NAME=VALUE, e.g. spp=64", param, context)
+        return name, text
+
+
 class OneOf(click.Choice[Any]):
     """One of several words, which the error for a misspelled one suggests."""
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import logging
 import sys
 import tomllib
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_args
@@ -44,6 +46,7 @@ def load(
     choice: ModelChoice = DEFAULT,
     moving: bool = False,
     approximate: bool = False,
+    parameters: Mapping[str, str] = {},
 ) -> Scene:
     """Load a scene from a .toml file, a Mitsuba .xml file, a model file (whose meshes get a sky, a sun and a camera),
     or from standard input for "-".
@@ -51,28 +54,28 @@ def load(
     A glTF model's first camera and its lights are used if it has any. camera: name of another camera to use, of a scene
     or a model file, or for a model one of VIEWS. up, unit: of a model file, if they are not as it or its format says;
     choice: for bare models; moving: whether a camera that frames a model frames its animation, as it does if one is
-    chosen; approximate: of a Mitsuba scene, whether what clrt lacks is replaced or left out, with warnings. Raises one
-    SceneError with all problems of the file, each as "FILE: object: value is wrong; remedy".
+    chosen; approximate: of a Mitsuba scene, whether what clrt lacks is replaced or left out, with warnings; parameters:
+    of a Mitsuba scene, values of $NAME. Raises one SceneError with all problems of the file, each as "FILE: object:
+    value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
         raise SceneError(f'{path!r} is not the path of a scene; give a file name, such as "scene.toml"')
     for name, value, known in (("up", up, Axis), ("unit", unit, Unit)):
         check_choice(name, value, (None, *get_args(known)))
-    if not isinstance(camera, str | None):
-        raise UsageError(f"camera {camera!r} is not a name")
-    if not isinstance(approximate, bool):
-        raise UsageError(f"approximate {approximate!r} is not a boolean")
+    _check_types(camera, approximate, parameters)
     path = Path(path)
     check_scene(path)
     reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower())
     if approximate and reader is not _load_mitsuba:
         raise UsageError(f"{path}: approximate is for Mitsuba's scenes; leave it out")
+    if parameters and reader is not _load_mitsuba:
+        raise UsageError(f"{path}: -D {next(iter(parameters))}: parameters are for Mitsuba's scenes; leave them out")
     if reader and (up or unit):
         raise UsageError(f'{path}: up and unit are for model files; in a scene file, write up = "z" in a [[mesh]]')
     if reader and choice != DEFAULT:
         raise UsageError(f"{path}: {choice.given()[0]}: is for bare models; leave {choice.given()[0]} out")
     if reader is _load_mitsuba:
-        reader = partial(_load_mitsuba, approximate=approximate)
+        reader = partial(_load_mitsuba, approximate=approximate, parameters=parameters)
     scene, problems = reader(path) if reader else (_load_model(path, camera, up, unit, choice, moving), [])
     views = [] if reader else [name for name in VIEWS if name not in scene.cameras]
     if camera is not None and camera not in views:
@@ -82,6 +85,16 @@ def load(
     if problems:
         raise SceneError([f"{path}: {problem}" for problem in problems])
     return scene
+
+
+def _check_types(camera: object, approximate: object, parameters: object) -> None:
+    """Raise UsageError unless these arguments of `load` are of their types."""
+    if not isinstance(camera, str | None):
+        raise UsageError(f"camera {camera!r} is not a name")
+    if not isinstance(approximate, bool):
+        raise UsageError(f"approximate {approximate!r} is not a boolean")
+    if not isinstance(parameters, Mapping) or not all(isinstance(each, str) for each in chain(*parameters.items())):
+        raise UsageError(f'parameters {parameters!r} do not map names to strings; write {{"NAME": "VALUE"}}')
 
 
 def check_scene(path: Path) -> None:
@@ -155,12 +168,12 @@ def _load_toml(path: Path) -> tuple[Scene, list[str]]:
     return scene, reader.problems
 
 
-def _load_mitsuba(path: Path, approximate: bool = False) -> tuple[Scene, list[str]]:
+def _load_mitsuba(path: Path, approximate: bool = False, parameters: Mapping[str, str] = {}) -> tuple[Scene, list[str]]:
     """Load a Mitsuba scene, logging a warning per model that only approximates Mitsuba's."""
     from .mitsuba.reader import read_mitsuba
 
     try:
-        scene, differences, _ = read_mitsuba(path, approximate=approximate)
+        scene, differences, _ = read_mitsuba(path, approximate=approximate, parameters=parameters)
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
     for difference in differences:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, TypeVar
@@ -75,14 +75,16 @@ class MitsubaScene(NamedTuple):
     missing: dict[str, list[str]]
 
 
-def read_mitsuba(path: Path, stand_in: Material | None = None, approximate: bool = False) -> MitsubaScene:
+def read_mitsuba(
+    path: Path, stand_in: Material | None = None, approximate: bool = False, parameters: Mapping[str, str] = {}
+) -> MitsubaScene:
     """Read the scene in an XML file of Mitsuba 3, as its `rgb` variants render it.
 
     stand_in: replaces materials that are not supported; approximate: what is not supported is replaced by something
-    similar, or left out. Raises SceneError if the file is malformed, and UnsupportedError with all features that clrt
-    does not support.
+    similar, or left out; parameters: values of $NAME. Raises SceneError if the file is malformed, and UnsupportedError
+    with all features that clrt does not support.
     """
-    return _Reader(stand_in, Notes(approximate)).scene(read_xml(path), name_of(path))
+    return _Reader(stand_in, Notes(approximate)).scene(read_xml(path, parameters), name_of(path))
 
 
 class _Reader:

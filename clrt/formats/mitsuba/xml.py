@@ -7,13 +7,14 @@ reads them.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn, TypeVar
 
 import numpy as np
 
-from ...errors import SceneError
+from ...errors import SceneError, did_you_mean
 from ..referenced_files import check_file, find_file
 from ..scene_parts.notes import UnsupportedError
 from .dialect import is_old, modernize
@@ -126,17 +127,22 @@ class Plugin:
         self.refuse(f'{self.tag} type "{self.kind}" is not supported', f"use {known}")
 
 
-def read_xml(path: Path) -> Plugin:
-    """Read the scene in an XML file. Raises SceneError if it is malformed or has a dangling reference."""
-    return _Document(path).scene()
+def read_xml(path: Path, parameters: Mapping[str, str] = {}) -> Plugin:
+    """Read the scene in an XML file. parameters: values of $NAME, which replace the <default> ones.
+
+    Raises SceneError if the file is malformed, has a dangling reference, or has no such parameter.
+    """
+    return _Document(path, parameters).scene()
 
 
 class _Document:
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, parameters: Mapping[str, str]) -> None:
         self._path = path
         self._parser = ElementParser()
         self._folders = [path.parent]
-        self._defaults: dict[str, str] = {}
+        self._given = parameters
+        self._defaults = {**parameters}
+        self._parameters: dict[str, None] = {}
         self._substituted = 0
         self._included = 0
         self._by_id: dict[str, Plugin] = {}
@@ -147,6 +153,7 @@ class _Document:
         root = self._root(self._path)
         scene = Plugin("scene", "scene", "scene")
         self._read_children(root, scene, 0)
+        self._check_parameters()
         for owner, place, name in self._references:
             if name not in self._by_id:
                 raise SceneError(f'{owner.at}: refers to "{name}", but nothing has that id; define it')
@@ -169,6 +176,7 @@ class _Document:
             self._substitute(child)
             name = child.get("name")
             if child.tag == "default":
+                self._parameters[name] = None
                 self._defaults.setdefault(name, child.get("value"))
             elif child.tag == "path":
                 self._folders.insert(0, self._folder(child.get("value")))
@@ -244,8 +252,12 @@ class _Document:
         """Replace $NAME in attributes by the value of its <default>."""
 
         def said(match: re.Match[str]) -> str:
+            self._parameters[match[1]] = None
             if match[1] not in self._defaults:
-                raise SceneError(f'{element.place}: ${match[1]} is undefined; write <default name="{match[1]}" …/>')
+                raise SceneError(
+                    f'{element.place}: ${match[1]} is undefined; write <default name="{match[1]}" …/>, or give it with '
+                    f"-D {match[1]}=VALUE{did_you_mean(match[1], self._defaults)}"
+                )
             self._substituted += len(self._defaults[match[1]])
             if self._substituted > LONGEST:
                 raise SceneError(
@@ -256,6 +268,18 @@ class _Document:
         for key, text in element.attrib.items():
             if "$" in text:
                 element.attrib[key] = re.sub(r"\$(\w+)", said, text)
+
+    def _check_parameters(self) -> None:
+        """Raise SceneError for given parameters that the scene has not."""
+        unknown = [name for name in self._given if name not in self._parameters]
+        has = f"it has {', '.join(self._parameters)}" if self._parameters else "it has none; leave it out"
+        if unknown:
+            raise SceneError(
+                [
+                    f"-D {name}: the scene has no such parameter; {has}{did_you_mean(name, self._parameters)}"
+                    for name in unknown
+                ]
+            )
 
 
 def _check_nesting(scene: Plugin) -> None:
