@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         MetallicRoughness as MetallicRoughness,
         Mirror as Mirror,
         Phong as Phong,
+        Plastic as Plastic,
     )
     from .scene.materials.textures import Picture as Picture, Texture as Texture
     from .scene.model import (
@@ -77,6 +78,7 @@ _HOME = {
         "MetallicRoughness",
         "Mirror",
         "Phong",
+        "Plastic",
     ),
     "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
     "scene.materials.textures": ("Picture", "Texture"),

@@ -1,5 +1,5 @@
 // The Beckmann distribution of microfacet normals h, with Smith's masking in the rational form of Walter et al. (2007).
-// Local frame. Directions are sampled from GGX of the same alpha, which is at least e/4 of it.
+// Local frame; w.z may be negative. Directions are sampled from GGX of the same alpha, which is at least e/4 of it.
 
 static inline real beckmann_d(real3 h, real alpha) {
     real a2 = alpha * alpha, z2 = h.z * h.z;
@@ -8,13 +8,13 @@ static inline real beckmann_d(real3 h, real alpha) {
 
 // Smith's Lambda for Beckmann; G1 = 1/(1 + Lambda).
 static inline real beckmann_lambda(real3 w, real alpha) {
-    real a = w.z / (alpha * sqrt(maximum(w.x * w.x + w.y * w.y, (real)(1e-30f))));
+    real a = absolute(w.z) / (alpha * sqrt(maximum(w.x * w.x + w.y * w.y, (real)(1e-30f))));
     real lambda = (1.0f - 1.259f * a + 0.396f * a * a) / (3.535f * a + 2.181f * a * a);
     return a < 1.6f ? maximum(lambda, ZERO) : ZERO;
 }
 
-// D·G/(4·cos wo), with height-correlated G; h: the half vector.
-static inline real beckmann_reflection(real3 h, real3 wo, real3 wi, real alpha) {
-    real masking = 1.0f + beckmann_lambda(wo, alpha) + beckmann_lambda(wi, alpha);
-    return beckmann_d(h, alpha) / (4.0f * wo.z * masking);
+// G2: separable, or height-correlated.
+static inline real beckmann_masking(real3 wo, real3 wi, real alpha, ireal separable) {
+    real o = beckmann_lambda(wo, alpha), i = beckmann_lambda(wi, alpha);
+    return 1.0f / (1.0f + o + i + (separable ? o * i : ZERO));
 }

@@ -1,5 +1,6 @@
 // A metal with a complex index of refraction eta + i·k: exact Fresnel equations at GGX microfacets, sampled by visible
-// normals. f = F(wi·h)·G·D/(4·cos wi·cos wo), with height-correlated G; single bounce. Local frame.
+// normals. f = F(wi·h)·G·D/(4·cos wi·cos wo), with height-correlated G (SEPARABLE_CONDUCTOR: or separable); single
+// bounce. Local frame.
 //
 // Measured metals are published as eta and k, with which Fresnel's equations are exact in each channel. F0 with a tint
 // at 82° (Hoffman 2019; Kutz et al. 2021) would fit these curves, but needs a fit for every metal.
@@ -13,8 +14,11 @@ struct conductor {
 #if TINTED_CONDUCTOR
     real3 reflectance;
 #endif
-#if BECKMANN
+#if BECKMANN_CONDUCTOR
     ireal beckmann;     // whether the distribution is Beckmann's
+#endif
+#if SEPARABLE_CONDUCTOR
+    ireal separable;    // whether G is
 #endif
 };
 
@@ -25,8 +29,11 @@ static inline struct conductor conductor_at(const Scene *scene, ireal index, con
 #if TINTED_CONDUCTOR
                               , PARAMETER3(conductor, reflectance)
 #endif
-#if BECKMANN
+#if BECKMANN_CONDUCTOR
                               , PARAMETER(conductor, beckmann) > 0.0f
+#endif
+#if SEPARABLE_CONDUCTOR
+                              , PARAMETER(conductor, separable) > 0.0f
 #endif
     };
 }
@@ -60,8 +67,15 @@ static inline BsdfValue conductor_eval(const struct conductor *m, real3 wo, real
     real3 f = conductor_fresnel(m, 0.5f * length);     // of wi·h = wo·h
     real visible = ggx_d(scale(sum, 1.0f / length), m->alpha) / (4.0f * wo.z * (1.0f + lambda_o));
     real seen = visible * (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i);
-#if BECKMANN
-    seen = m->beckmann ? beckmann_reflection(scale(sum, 1.0f / length), wo, wi, m->alpha) : seen;
+#if SEPARABLE_CONDUCTOR
+#define SEPARABLE(m) ((m)->separable)
+    seen = m->separable ? visible / (1.0f + lambda_i) : seen;
+#else
+#define SEPARABLE(m) NO_LANES
+#endif
+#if BECKMANN_CONDUCTOR
+    real beckmann = beckmann_d(scale(sum, 1.0f / length), m->alpha) * beckmann_masking(wo, wi, m->alpha, SEPARABLE(m));
+    seen = m->beckmann ? beckmann / (4.0f * wo.z) : seen;
 #endif
     return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), (BsdfValue){scale(f, seen), splat(ZERO), visible}, no_value());
 }

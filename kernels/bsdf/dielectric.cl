@@ -8,23 +8,11 @@
 // where c = color is the transmittance from face to face. A rough sheet spreads both alike (as glTF's transmission).
 // ATTENUATION: absorption inside by the Beer–Lambert law (integrator/path_segment.cl). A sheet leaves the
 // surrounding absorption unchanged.
+// TINTED_DIELECTRIC: reflected light is multiplied by `reflectance`. BECKMANN_DIELECTRIC, SEPARABLE_DIELECTRIC: rough
+// glass with other microfacets (rough_dielectric.cl).
 // DISPERSION: each channel has an index of its own (dispersion.cl).
+#include "bsdf/fresnel_dielectric.cl"
 #include "bsdf/interface.cl"
-
-static inline real fresnel_of_cosines(real cos_o, real cos_t, real eta) {
-    real parallel = (eta * cos_o - cos_t) / (eta * cos_o + cos_t);
-    real perpendicular = (cos_o - eta * cos_t) / (cos_o + eta * cos_t);
-    return 0.5f * (parallel * parallel + perpendicular * perpendicular);
-}
-
-// Fresnel reflectance F of unpolarised light at cos_o > 0 from a medium into one of relative index eta; cos_t of the
-// refracted direction, 0 for total internal reflection.
-static inline real fresnel_dielectric(real cos_o, real eta, real *cos_t) {
-    real cos2_t = ((eta - 1.0f) * (eta + 1.0f) + cos_o * cos_o) / (eta * eta);   // 1 − sin²/eta² without cancellation
-    *cos_t = safe_sqrt(cos2_t);
-    real reflected = fresnel_of_cosines(cos_o, *cos_t, eta);
-    return cos2_t > 0.0f ? reflected : ONE;
-}
 
 #if DISPERSION
 // channel: the only one of the path, or −1. etas: eta of each channel.
@@ -36,6 +24,15 @@ struct dielectric {
     real eta;           // index of refraction beyond the surface over that on wo's side
 #if ROUGH_DIELECTRIC
     real alpha;         // 0 if smooth
+#endif
+#if TINTED_DIELECTRIC
+    real3 reflectance;
+#endif
+#if BECKMANN_DIELECTRIC
+    ireal beckmann;     // whether the distribution is Beckmann's
+#endif
+#if SEPARABLE_DIELECTRIC
+    ireal separable;    // whether G is
 #endif
 #if DIELECTRIC_ENERGY
     const Scene *scene;
@@ -69,7 +66,13 @@ static inline real3 dielectric_absorption(const struct dielectric *m, real3 here
 static inline real3 dielectric_albedo(const struct dielectric *m) { return m->color; }
 
 // Fresnel split, given F: the probability of sampling reflection, and the weights of reflection and transmission.
-typedef struct { real reflected; real3 reflection, transmission; } Division;
+typedef struct {
+    real reflected;
+    real3 reflection, transmission;
+#if BECKMANN_DIELECTRIC
+    real3 facet;        // normal of the microfacet
+#endif
+} Division;
 
 static inline real thin_reflection(real f, real c) {
     return 0.5f * (1.0f + f) * (1.0f + square((1.0f - f) * c) / maximum(1.0f - square(c * f), (real)(UNIT_ROUNDOFF)));
@@ -79,7 +82,10 @@ static inline real thin_transmission(real f, real c) {
 }
 
 static inline Division divide_light(const struct dielectric *m, real f) {
-    Division d = {f, splat(ONE), m->color};
+    Division d;
+    d.reflected = f;
+    d.reflection = splat(ONE);
+    d.transmission = m->color;
 #if THIN_DIELECTRIC
     real3 c = m->color;
     real3 back = vector(thin_reflection(f, c.x), thin_reflection(f, c.y), thin_reflection(f, c.z));
@@ -87,6 +93,9 @@ static inline Division divide_light(const struct dielectric *m, real f) {
     d.reflected = m->thin ? 2.0f * f / (1.0f + f) : f;
     d.reflection = choose(m->thin, back, d.reflection);
     d.transmission = choose(m->thin, on, d.transmission);
+#endif
+#if TINTED_DIELECTRIC
+    d.reflection = mul(d.reflection, m->reflectance);
 #endif
     return d;
 }
@@ -132,6 +141,15 @@ static inline struct dielectric dielectric_at(const Scene *scene, ireal index, c
     real roughness = PARAMETER(dielectric, roughness);
     ireal rough = (roughness > 0.0f) & ((ior != 1.0f) | IS_THIN(&m));    // without refraction there is no roughness
     m.alpha = rough ? maximum(roughness * roughness, (real)(ALPHA_MIN)) : ZERO;
+#endif
+#if TINTED_DIELECTRIC
+    m.reflectance = PARAMETER3(dielectric, reflectance);
+#endif
+#if BECKMANN_DIELECTRIC
+    m.beckmann = PARAMETER(dielectric, beckmann) > 0.0f;
+#endif
+#if SEPARABLE_DIELECTRIC
+    m.separable = PARAMETER(dielectric, separable) > 0.0f;
 #endif
 #if DIELECTRIC_ENERGY
     m.scene = scene;

@@ -3,8 +3,16 @@
 //
 // Single bounce: light that hits a second microfacet is lost. DIELECTRIC_ENERGY compensates for that
 // (dielectric_energy.cl).
+// SEPARABLE_DIELECTRIC: with the separable G2. BECKMANN_DIELECTRIC: with Beckmann's distribution, sampled like GGX.
 #include "bsdf/ggx.cl"
+#include BECKMANN_FILE
 #include DIELECTRIC_ENERGY_FILE
+
+#if SEPARABLE_DIELECTRIC
+#define SEPARABLE_GLASS(m) ((m)->separable)
+#else
+#define SEPARABLE_GLASS(m) NO_LANES
+#endif
 
 // The pdf with which microfacets reflect, or transmit, light to wi, which may be on the wrong side of the surface. *d:
 // the Fresnel split there.
@@ -16,6 +24,9 @@ static inline real scattered_pdf(const struct dielectric *m, real3 wo, real3 wi,
     real cos_o = mirrored ? 0.5f * length : dot3(wo, h), cos_i = dot3(wi, h), cos_t;
     real f = fresnel_dielectric(cos_o, m->eta, &cos_t);
     *d = divide_light(m, mirrored ? f : fresnel_of_cosines(cos_o, -cos_i, m->eta));
+#if BECKMANN_DIELECTRIC
+    d->facet = h;
+#endif
     // Change of variables from visible normals: dωi = 4·cos_o dωh, or |wo + eta·wi|²/(eta²·|cos_i|) dωh for refraction.
     real visible = ggx_d(h, m->alpha) / (wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
     real turned = mirrored ? (real)(0.25f) : cos_o * m->eta * m->eta * absolute(cos_i) / length2;
@@ -33,6 +44,14 @@ static inline real rough_dielectric(const struct dielectric *m, real3 wo, real3 
     real pdf = scattered_pdf(m, wo, wi, reflected, &d);
     real lambda_o = ggx_lambda(wo, m->alpha), lambda_i = ggx_lambda(wi, m->alpha);
     real seen = pdf * (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i);
+#if SEPARABLE_DIELECTRIC
+    seen = m->separable ? pdf / (1.0f + lambda_i) : seen;
+#endif
+#if BECKMANN_DIELECTRIC
+    real facets = beckmann_d(d.facet, m->alpha) / ggx_d(d.facet, m->alpha);
+    real masking = beckmann_masking(wo, wi, m->alpha, SEPARABLE_GLASS(m));
+    seen = m->beckmann ? pdf * (1.0f + lambda_o) * facets * masking : seen;
+#endif
     *value = choose(pdf > 0.0f, scale(choose(reflected, d.reflection, d.transmission), seen), splat(ZERO));
 #if DIELECTRIC_ENERGY
     ireal folds = keeps_light(m);

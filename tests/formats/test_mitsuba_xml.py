@@ -121,7 +121,7 @@ def test_defaults_includes_references_and_paths(folder: Path) -> None:
             ["sensor[0].to_world", "rotate"],
         ),
         ('<emitter type="constant"/><emitter type="constant"/>', ["several environment lights"]),
-        ('<shape type="sphere"><bsdf type="roughdielectric"/></shape>', ["shape[0].bsdf", '"beckmann"', '"ggx"']),
+        ('<shape type="sphere"><bsdf type="ggx"/></shape>', ["shape[0].bsdf", '"ggx"', "roughdielectric"]),
         (
             '<shape type="sphere"><bsdf type="conductor"><string name="material" value="Xy"/></bsdf></shape>',
             ['"Xy"', "Au"],
@@ -167,7 +167,7 @@ def test_materials(folder: Path) -> None:
         '<bsdf type="roughconductor"><spectrum name="eta" value="0.5"/><spectrum name="k" value="3"/>'
         '<float name="alpha" value="0.04"/><string name="distribution" value="ggx"/></bsdf>'
     )
-    assert material(folder, metal) == Conductor(eta=(0.5,) * 3, k=(3.0,) * 3, roughness=0.2)
+    assert material(folder, metal) == Conductor(eta=(0.5,) * 3, k=(3.0,) * 3, roughness=0.2, smith="separable")
     glass = '<bsdf type="dielectric"><string name="int_ior" value="water"/><float name="ext_ior" value="1"/></bsdf>'
     assert material(folder, glass) == Dielectric(ior=1.333)
     medium = (

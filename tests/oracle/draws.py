@@ -17,8 +17,11 @@ from clrt.scene.materials.material_types import (
     MetallicRoughness,
     Mirror,
     Phong,
+    Plastic,
+    SmithTerm,
 )
 from clrt.scene.materials.metallic_roughness import Coupling, Smith
+from clrt.scene.materials.plastic import Distribution
 from clrt.scene.materials.presets import CONDUCTORS, F0_PRESETS
 from clrt.scene.materials.textures import Channel, Picture, Texture, Wrap
 
@@ -110,6 +113,9 @@ def _dielectric(draws: Draws) -> dict[str, Any]:
         given |= {"attenuation_color": draws.vector(0.1, 0.9), "attenuation_distance": draws.between(0.2, 2.0)}
     if given["roughness"] == 0.0 and inside != "thin" and draws.chance(0.3):
         given |= {"dispersion": draws.between(0.5, 10.0)}
+    elif draws.chance(0.3):
+        given |= {"multiple_scattering": False, "distribution": draws.one_of(get_args(Distribution))}
+        given |= {"smith": draws.one_of(get_args(SmithTerm)), "reflectance": draws.color(0.5, 1.0)}
     return given | {"thin": inside == "thin"}
 
 
@@ -117,6 +123,7 @@ def _conductor(draws: Draws) -> dict[str, Any]:
     given: dict[str, Any] = {"roughness": draws.number(SMOOTHEST), "preset": draws.one_of(CONDUCTORS)}
     given |= {"eta": draws.vector(0.2, 3.0), "k": draws.vector(0.0, 5.0)} if draws.chance(0.3) else {}
     given |= {"distribution": "beckmann"} if draws.chance(0.3) else {}
+    given |= {"smith": "separable"} if draws.chance(0.3) else {}
     return given | ({"reflectance": draws.color()} if draws.chance(0.3) else {})
 
 
@@ -153,6 +160,17 @@ def _phong(draws: Draws) -> dict[str, Any]:
     return {"color": draws.color(), "specular": draws.color(0.0, 0.8), "shininess": 10 ** draws.between(0.0, 1.7)}
 
 
+def _plastic(draws: Draws) -> dict[str, Any]:
+    return {
+        "color": draws.color(),
+        "ior": draws.between(1.1, 2.0),
+        "roughness": draws.between(SMOOTHEST, 0.9),
+        "specular": draws.color(0.2, 1.0),
+        "distribution": draws.one_of(get_args(Distribution)),
+        "nonlinear": draws.chance(0.5),
+    }
+
+
 DRAWERS: dict[type[Material], Callable[[Draws], dict[str, Any]]] = {
     Diffuse: _diffuse,
     Mirror: _mirror,
@@ -161,4 +179,5 @@ DRAWERS: dict[type[Material], Callable[[Draws], dict[str, Any]]] = {
     MetallicRoughness: _metallic_roughness,
     Phong: _phong,
     BlinnPhong: _phong,
+    Plastic: _plastic,
 }

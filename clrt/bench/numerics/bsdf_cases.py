@@ -71,7 +71,14 @@ LAYERS: dict[str, tuple[dict[str, Any], ...]] = {
             "sheen_roughness": 0.3,
         },
     ),
-    "dielectric": ({"multiple_scattering": False}, {"roughness": 0.0, "dispersion": 2.0}),
+    "plastic": ({"ior": 2.0},),
+    "dielectric": (
+        {"multiple_scattering": False},
+        {"roughness": 0.0, "dispersion": 2.0},
+        {"distribution": "beckmann", "smith": "separable", "multiple_scattering": False},
+        {"distribution": "beckmann", "reflectance": COLOR, "multiple_scattering": False},
+        {"smith": "separable", "multiple_scattering": False},
+    ),
 }
 #: cos θ of wo, down to grazing; the sines are float32 numbers or round to 1.
 COSINES = (1.0, 0.6, 0.1, 2.0**-7, 2.0**-10, 2.0**-13)

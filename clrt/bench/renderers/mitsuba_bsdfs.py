@@ -26,6 +26,7 @@ from ...scene.materials.material_types import (
     MetallicRoughness,
     Mirror,
     Phong,
+    Plastic,
 )
 from ...scene.materials.textures import Texture, Wrap, untextured
 from ...scene.model import Mesh, Sphere
@@ -241,6 +242,8 @@ def _dielectric(material: Dielectric) -> Plugin:
     if material.dispersion:
         raise ValueError("dispersion")
     if material.thin and (material.rough or untextured(material.color) != (1.0, 1.0, 1.0)):
+        if material.features() & {"TINTED_DIELECTRIC", "BECKMANN_DIELECTRIC", "SEPARABLE_DIELECTRIC"}:
+            raise ValueError("a thin sheet with reflectance, distribution or smith")
         return {
             "type": "sheet",
             "ior": material.ior,
@@ -253,10 +256,11 @@ def _dielectric(material: Dielectric) -> Plugin:
         "int_ior": material.ior,
         "ext_ior": 1.0,
         "specular_transmittance": color(material.color),
+        "specular_reflectance": color(material.reflectance),
     }
     if material.is_specular:
         return plugin
-    single = _rough(plugin | {"type": "roughdielectric"}, material.roughness)
+    single = _rough(plugin | {"type": "roughdielectric"}, material)
     return (
         {
             "type": "all_bounces",
@@ -274,19 +278,32 @@ def _conductor(material: Conductor) -> Plugin:
     values = material.parameters()
     plugin = {"type": "roughconductor", "eta": rgb(values["eta"]), "k": rgb(values["k"])}
     plugin |= {"specular_reflectance": color(material.reflectance)} if "reflectance" in values else {}
+    return _rough(plugin, material)
+
+
+def _plastic(material: Plastic) -> Plugin:
+    """Return roughplastic, also for a smooth coat, which in clrt has the smallest alpha."""
+    return {
+        "type": "roughplastic",
+        "distribution": material.distribution,
+        "alpha": _alpha(material.roughness),
+        "int_ior": material.ior,
+        "ext_ior": 1.0,
+        "diffuse_reflectance": color(material.color),
+        "specular_reflectance": color(material.specular),
+        "nonlinear": material.nonlinear,
+    }
+
+
+def _rough(plugin: Plugin, material: Conductor | Dielectric) -> Plugin:
+    """Add the microfacets to a plugin. Raises ValueError if Mitsuba lacks their Smith term."""
+    alpha = _alpha(material.roughness)
+    plugin = plugin | {"distribution": material.distribution, "alpha": alpha}
+    if material.smith == "separable" or alpha <= NEARLY_SMOOTH:
+        return plugin
     if material.distribution == "beckmann":
-        alpha = _alpha(material.roughness)
-        if alpha > NEARLY_SMOOTH:
-            raise ValueError(f"Beckmann's distribution with alpha above {NEARLY_SMOOTH} and height-correlated masking")
-        return plugin | {"distribution": "beckmann", "alpha": alpha}
-    return _rough(plugin, material.roughness)
-
-
-def _rough(plugin: Plugin, roughness: float | Texture) -> Plugin:
-    """Add GGX and the height-correlated Smith term to a plugin."""
-    alpha = _alpha(roughness)
-    plugin = plugin | {"distribution": "ggx", "alpha": alpha}
-    return plugin if alpha <= NEARLY_SMOOTH else {"type": "height_correlated", "alpha": alpha, "bsdf": plugin}
+        raise ValueError(f"Beckmann's distribution with alpha above {NEARLY_SMOOTH} and height-correlated masking")
+    return {"type": "height_correlated", "alpha": alpha, "bsdf": plugin}
 
 
 def _alpha(roughness: float | Texture) -> float:
@@ -301,4 +318,5 @@ BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {
     Conductor: _conductor,
     Phong: _phong,
     BlinnPhong: _phong,
+    Plastic: _plastic,
 }

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...errors import SceneError
 from ...scene.materials.material_types import Conductor, Dielectric, Diffuse, Material, Mirror
+from ...scene.materials.plastic import Distribution
 from ...scene.materials.textures import Texture
 from ..scene_parts.refractive_indices import DIELECTRICS, METALS, Triple
 from .materials import WHITE, MaterialReader, ShapeMaterial
@@ -19,8 +20,6 @@ from .textures import Attribute
 from .values import rgb
 from .xml import Plugin
 
-#: Largest alpha at which the separable Smith term reduces albedo by less than 4e-4 below the height-correlated one.
-NEARLY_SMOOTH = 0.09
 #: Indices of a metal that reflects all light to 2e-4, for `material` "none".
 PERFECT = (0.01, 0.01, 0.01), (100.0, 100.0, 100.0)
 
@@ -94,14 +93,16 @@ def blend(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
 def dielectric(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     thin, rough = plugin.kind == "thindielectric", plugin.kind == "roughdielectric"
     ior = index(plugin, "int_ior", "bk7") / index(plugin, "ext_ior", "air")
-    reader.white(plugin, "specular_reflectance")
     color = reader.color(plugin, "specular_transmittance", 1.0)
-    roughness = roughness_of(reader, plugin) if rough else 0.0
-    if rough:
-        separable(reader, plugin, roughness)
-    return ShapeMaterial(
-        Dielectric(ior=ior, color=color, thin=thin, roughness=roughness, multiple_scattering=not rough)
-    )  # Mitsuba's models single scattering only
+    if thin and color != WHITE:
+        reader.notes.differ(plugin, "a tinted sheet absorbs between its faces, too, in Mitsuba only what it transmits")
+    glass = Dielectric(ior=ior, color=color, thin=thin, reflectance=reader.color(plugin, "specular_reflectance", 1.0))
+    if rough:  # Mitsuba's models single scattering only
+        roughness, distribution = roughness_of(reader, plugin), distribution_of(reader, plugin)
+        glass = replace(
+            glass, roughness=roughness, distribution=distribution, smith="separable", multiple_scattering=False
+        )
+    return ShapeMaterial(glass)
 
 
 def conductor(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
@@ -119,11 +120,8 @@ def conductor(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     if plugin.kind == "conductor":
         reader.notes.differ(plugin, "smooth metal has alpha 0.0001, and reflects point-like lights")
         return ShapeMaterial(metal)
-    if plugin.value("distribution", str, "beckmann") == "beckmann":
-        metal = replace(metal, distribution="beckmann")
-    roughness = roughness_of(reader, plugin, ("ggx", "beckmann"))
-    separable(reader, plugin, roughness)
-    return ShapeMaterial(replace(metal, roughness=roughness))
+    roughness, distribution = roughness_of(reader, plugin), distribution_of(reader, plugin)
+    return ShapeMaterial(replace(metal, roughness=roughness, distribution=distribution, smith="separable"))
 
 
 def _limited(parts: Triple, factor: float, least: float) -> Triple:
@@ -132,18 +130,25 @@ def _limited(parts: Triple, factor: float, least: float) -> Triple:
     return red, green, blue
 
 
-def roughness_of(reader: MaterialReader, plugin: Plugin, distributions: tuple[str, ...] = ("ggx",)) -> float | Texture:
-    """Return √alpha of an isotropic distribution. distributions: those that the material has."""
-    plugin.value("sample_visible", bool, True)
+def distribution_of(reader: MaterialReader, plugin: Plugin) -> Distribution:
+    """Return the microfacets' distribution."""
     distribution = plugin.value("distribution", str, "beckmann")
-    if distribution not in distributions:
+    if distribution == "beckmann":
+        return "beckmann"
+    if distribution != "ggx":
         reader.notes.instead(
             plugin,
             f'distribution "{distribution}" is not supported',
-            'write "ggx"',
+            'write "ggx" or "beckmann"',
             "GGX of the same alpha is used",
             f"{plugin.kind}, {distribution}",
         )
+    return "ggx"
+
+
+def roughness_of(reader: MaterialReader, plugin: Plugin) -> float | Texture:
+    """Return √alpha of an isotropic distribution."""
+    plugin.value("sample_visible", bool, True)
     if {"alpha_u", "alpha_v"} & {*plugin.values, *dict(plugin.children)}:
         alpha, other = (reader.number(plugin, name, 0.1) for name in ("alpha_u", "alpha_v"))
     else:
@@ -159,12 +164,6 @@ def roughness_of(reader: MaterialReader, plugin: Plugin, distributions: tuple[st
         if isinstance(alpha, float):
             alpha = other if isinstance(other, Texture) else sqrt(alpha * other)
     return reader.textures.baked(alpha, "number", np.sqrt) if isinstance(alpha, Texture) else sqrt(alpha)
-
-
-def separable(reader: MaterialReader, plugin: Plugin, roughness: float | Texture) -> None:
-    """Note that Mitsuba's Smith term differs, if the surface is so rough that this matters."""
-    if isinstance(roughness, Texture) or roughness**2 > NEARLY_SMOOTH:
-        reader.notes.differ(plugin, "the height-correlated Smith term, Mitsuba's is separable")
 
 
 def index(plugin: Plugin, name: str, default: str) -> float:

@@ -10,7 +10,6 @@ from ...scene.materials.material_types import Material
 from ...scene.materials.textures import Texture
 from ..scene_parts.notes import Notes
 from .textures import Attribute, TextureReader
-from .values import rgb
 from .xml import Plugin
 
 WHITE = (1.0, 1.0, 1.0)
@@ -63,11 +62,6 @@ class MaterialReader:
             plugin.refuse(f"{name} is an attribute", "write a number or a bitmap", f"{name} by a mesh's attribute")
         assert isinstance(number, float | Texture)
         return number
-
-    def white(self, plugin: Plugin, name: str) -> None:
-        """Require that a color is white."""
-        if plugin.child(name) is not None or rgb(plugin.color(name, 1.0)) != WHITE:
-            self.notes.instead(plugin, f"{name} is not 1", "leave it out", "it is left out", name)
 
 
 Convert = Callable[[MaterialReader, Plugin], ShapeMaterial]

@@ -2,7 +2,7 @@
 
 To add one: write its kernel file, write its dataclass here and list it in MATERIALS, where the scene file, the
 validation, the packing and the tests of every BSDF find it. Field types carry their limits (limits.py), which
-`validate` checks for scenes from files and from Python alike. MetallicRoughness has a file of its own.
+`validate` checks for scenes from files and from Python alike. MetallicRoughness and Plastic have files of their own.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from ..fields.limits import Ge, Gt, Le
 from .dielectric_energy import ROWS, tables
 from .material import MOST_IOR, Albedo as Albedo, Material as Material, Parameter, Unit
 from .metallic_roughness import MetallicRoughness as MetallicRoughness
+from .plastic import Distribution, Plastic as Plastic
 from .presets import CONDUCTORS, ConductorPreset
 from .textures import NonNegative, Texture
 
@@ -23,6 +24,8 @@ Extinction = Annotated[float, Ge(0), Le(100)]
 
 #: Lower limit of colors when taking their logarithm.
 BLACK = 1e-30
+WHITE = (1.0, 1.0, 1.0)
+SmithTerm = Literal["height_correlated", "separable"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +41,8 @@ class Conductor(Material):
     """Metal with a measured complex index of refraction eta + i·k per channel and a microfacet distribution.
 
     `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². `reflectance`, which
-    measured metals do not have, multiplies what is reflected. Single scattering only.
+    measured metals do not have, multiplies what is reflected. `smith`: the masking–shadowing term. Single scattering
+    only.
     """
 
     kernel: ClassVar[str] = "conductor"
@@ -48,17 +52,20 @@ class Conductor(Material):
     k: tuple[Extinction, Extinction, Extinction] | None = None
     roughness: Unit | Texture = 0.3
     reflectance: Albedo | Texture = (1.0, 1.0, 1.0)
-    distribution: Literal["ggx", "beckmann"] = "ggx"
+    distribution: Distribution = "ggx"
+    smith: SmithTerm = "height_correlated"
 
     def parameters(self) -> dict[str, Parameter]:
         eta, k = CONDUCTORS[self.preset]
         values: dict[str, Parameter] = {"eta": self.eta or eta, "k": self.k or k, "roughness": self.roughness}
         has = self.features()
         values |= {"reflectance": self.reflectance} if "TINTED_CONDUCTOR" in has else {}
-        return values | ({"beckmann": 1.0} if "BECKMANN" in has else {})
+        values |= {"beckmann": 1.0} if "BECKMANN_CONDUCTOR" in has else {}
+        return values | ({"separable": 1.0} if "SEPARABLE_CONDUCTOR" in has else {})
 
     def features(self) -> frozenset[str]:
-        has = {"TINTED_CONDUCTOR": self.reflectance != (1.0, 1.0, 1.0), "BECKMANN": self.distribution == "beckmann"}
+        has = {"TINTED_CONDUCTOR": self.reflectance != WHITE, "SEPARABLE_CONDUCTOR": self.smith == "separable"}
+        has |= dict.fromkeys(("BECKMANN", "BECKMANN_CONDUCTOR"), self.distribution == "beckmann")
         return frozenset(name for name, present in has.items() if present)
 
     def conflicts(self) -> list[str]:
@@ -86,7 +93,9 @@ class Dielectric(Material):
 
     - ior: index of refraction inside over that outside
     - color: the fraction of the refracted light that is transmitted
-    - roughness: of the surface, with alpha = roughness² of the GGX distribution; 0 is smooth
+    - reflectance: multiplies the reflected light, which real glass does not
+    - roughness: of the surface, with alpha = roughness² of the microfacets' distribution; 0 is smooth
+    - distribution, smith: of the microfacets of rough glass; others than the default ones scatter once only
     - multiple_scattering: compensates the energy that single scattering between microfacets loses, so that rough glass
       loses no light
     - dispersion: 20 over the Abbe number of smooth glass: red, green and blue have indices of refraction of their own
@@ -97,10 +106,13 @@ class Dielectric(Material):
     """
 
     kernel: ClassVar[str] = "dielectric"
-    parts: ClassVar[tuple[str, ...]] = ("ROUGH_DIELECTRIC", "DIELECTRIC_ENERGY", "DISPERSION")
+    parts: ClassVar[tuple[str, ...]] = ("ROUGH_DIELECTRIC", "DIELECTRIC_ENERGY", "DISPERSION", "BECKMANN")
     color: Albedo | Texture = (1.0, 1.0, 1.0)
     ior: Annotated[float, Ge(1 / MOST_IOR), Le(MOST_IOR)] = 1.5
     roughness: Unit | Texture = 0.0
+    reflectance: Albedo | Texture = WHITE
+    distribution: Distribution = "ggx"
+    smith: SmithTerm = "height_correlated"
     multiple_scattering: bool = True
     thin: bool = False
     dispersion: NonNegative = 0.0
@@ -118,6 +130,9 @@ class Dielectric(Material):
             values["thin"] = 1.0
         if self.dispersion:
             values["dispersion"] = self.dispersion
+        has = self.features()
+        values |= {"reflectance": self.reflectance} if "TINTED_DIELECTRIC" in has else {}
+        values |= {name: 1.0 for name in ("beckmann", "separable") if f"{name.upper()}_DIELECTRIC" in has}
         if (distance := self.attenuation_distance) is not None:
             values["absorption"] = tuple(
                 min(-log(max(part, BLACK)) / distance, 1 / BLACK) for part in self.attenuation_color
@@ -143,6 +158,15 @@ class Dielectric(Material):
         faults = [fault] if self.thin and self.attenuation_distance is not None else []
         if self.dispersion and (self.rough or self.thin):
             faults.append("dispersion: is for solid glass with roughness = 0; write dispersion = 0")
+        if self.dispersion and self.reflectance != WHITE:
+            faults.append("dispersion: is for glass with reflectance = [1, 1, 1]; write dispersion = 0")
+        single = {"reflectance": WHITE, "distribution": "ggx", "smith": "height_correlated"}
+        if self.scatters_again:
+            faults += [
+                f"{name}: scatters once only; write multiple_scattering = false, or leave {name} out"
+                for name, usual in single.items()
+                if getattr(self, name) != usual
+            ]
         return faults
 
     def in_unit(self, unit: float) -> Dielectric:
@@ -158,6 +182,10 @@ class Dielectric(Material):
             "THIN_DIELECTRIC": self.thin,
             "ATTENUATION": self.attenuation_distance is not None,
             "DISPERSION": self.dispersion != 0,
+            "TINTED_DIELECTRIC": self.reflectance != WHITE,
+            "BECKMANN": self.rough and self.distribution == "beckmann",
+            "BECKMANN_DIELECTRIC": self.rough and self.distribution == "beckmann",
+            "SEPARABLE_DIELECTRIC": self.rough and self.smith == "separable",
         }
         return frozenset(name for name, present in has.items() if present)
 
@@ -185,4 +213,13 @@ class BlinnPhong(Phong):
     kernel: ClassVar[str] = "blinn_phong"
 
 
-MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric, Conductor, Phong, BlinnPhong)
+MATERIALS: tuple[type[Material], ...] = (
+    Diffuse,
+    MetallicRoughness,
+    Mirror,
+    Dielectric,
+    Conductor,
+    Phong,
+    BlinnPhong,
+    Plastic,
+)

@@ -14,6 +14,7 @@ from clrt.scene.materials.material_types import (
     MetallicRoughness,
     Mirror,
     Phong,
+    Plastic,
 )
 
 from ..surface import Surface
@@ -23,6 +24,7 @@ from .dispersion import glass
 from .metallic_roughness import CookTorrance
 from .mirror import Specular
 from .phong import BlinnGloss, PhongGloss
+from .plastic import CoatedBase
 from .scattering import Scattering
 
 SCATTERINGS: dict[type[Material], Callable[[Any, Surface], Scattering]] = {
@@ -33,6 +35,7 @@ SCATTERINGS: dict[type[Material], Callable[[Any, Surface], Scattering]] = {
     Conductor: Metal,
     Phong: PhongGloss,
     BlinnPhong: BlinnGloss,
+    Plastic: CoatedBase,
 }
 
 

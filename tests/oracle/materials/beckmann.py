@@ -6,16 +6,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..vectors import Doubles
-from .scattering import halfway
 
 
-def reflection(wo: Doubles, wi: Doubles, alpha: Doubles) -> Doubles:
-    """Return D·G/(4·cos wo) (n,), so f·cos wi for F = 1, with height-correlated G; 0 below the horizon."""
-    up = (wo[:, 2] > 0) & (wi[:, 2] > 0)
-    o, i = np.where(up, wo[:, 2], 1), np.where(up, wi[:, 2], 1)
-    z2 = np.maximum(halfway(wo, np.where(up[:, None], wi, wo))[:, 2] ** 2, 1e-300)
-    d = np.exp(-(1 - z2) / (alpha**2 * z2)) / (np.pi * alpha**2 * z2**2)
-    return np.where(up, d / (1 + smith_lambda(o, alpha) + smith_lambda(i, alpha)) / (4 * o), 0)
+def distribution(h: Doubles, alpha: Doubles) -> Doubles:
+    """Return D (eq. 25)."""
+    z2 = np.maximum(h[:, 2] ** 2, 1e-300)
+    return np.where(h[:, 2] > 0, np.exp(-(1 - z2) / (alpha**2 * z2)) / (np.pi * alpha**2 * z2**2), 0)
 
 
 def smith_lambda(cosine: Doubles, alpha: Doubles) -> Doubles:

@@ -9,9 +9,9 @@ from clrt.scene.materials.presets import CONDUCTORS
 
 from ..surface import Surface
 from ..vectors import Doubles, dot
-from .beckmann import reflection as beckmann_reflection
 from .fresnel import conductor
-from .ggx import VisibleNormals, alpha_of, reflection
+from .ggx import VisibleNormals, alpha_of
+from .microfacets import reflection
 from .scattering import Cosine, Mixed, halfway
 
 
@@ -21,9 +21,9 @@ class Metal(Mixed):
         self._eta, self._k = np.array(material.eta or eta), np.array(material.k or k)
         self._reflectance = at.color(material.reflectance)
         self._alpha = alpha_of(at.number(material.roughness))
-        self._reflection = beckmann_reflection if material.distribution == "beckmann" else reflection
+        self._facets = material.distribution, material.smith
         self.strategies = [VisibleNormals(self._alpha), Cosine()]
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
         fresnel = conductor(np.abs(dot(wo, halfway(wo, wi))), self._eta, self._k)
-        return self._reflectance * fresnel * self._reflection(wo, wi, self._alpha)[:, None]
+        return self._reflectance * fresnel * reflection(wo, wi, self._alpha, *self._facets)[:, None]

@@ -1,5 +1,5 @@
-"""Glass: Fresnel's equations and Snell's law at a smooth surface, at GGX microfacets (Walter et al. 2007, with the
-height-correlated G2 of Heitz 2014), and at both faces of a thin sheet; for lost energy see glass_energy.
+"""Glass: Fresnel's equations and Snell's law at a smooth surface, at microfacets (Walter et al. 2007, by default GGX
+with the height-correlated G2 of Heitz 2014), and at both faces of a thin sheet; for lost energy see glass_energy.
 
 Radiance increases on entering a denser medium by the square of the relative index (Walter 2007, sec. 4.1).
 """
@@ -13,8 +13,9 @@ from clrt.scene.materials.material_types import Dielectric
 from ..surface import Surface
 from ..vectors import Bools, Doubles, dot, unit
 from . import fresnel
-from .ggx import LEAST, distribution, reflection, shadowing, smith_lambda, visible_normals
+from .ggx import LEAST, distribution as sampled_distribution, smith_lambda, visible_normals
 from .glass_energy import Energy
+from .microfacets import distribution, reflection, shadowing
 from .scattering import Cosine, Sample, Scattering, halfway, mirrored_below, reflected
 
 
@@ -27,6 +28,7 @@ class Glass(Scattering):
         self.eta = np.where(at.front | material.thin, material.ior, 1 / material.ior)
         self.alpha = np.maximum(roughness**2, LEAST)
         self.rough = (roughness > 0) & (material.thin or material.ior != 1)
+        self.reflectance, self.facets = at.color(material.reflectance), (material.distribution, material.smith)
         self.outside, self.energy = at.front | material.thin, None
         if material.multiple_scattering and self.rough.any():
             assert self.rough.all()
@@ -38,18 +40,18 @@ class Glass(Scattering):
         """Return what microfacets with Fresnel term F reflect and transmit, (n, 3) each."""
         f, c = f[:, None], self.color
         if not self.thin:
-            return np.tile(f, (1, 3)), (1 - f) * c
+            return f * self.reflectance, (1 - f) * c
         # All bounces between the faces: a geometric series.
         between = 1 - (c * f) ** 2
         safe = np.where(between > 0, between, 1)
-        return f + (1 - f) ** 2 * c**2 * f / safe, (1 - f) ** 2 * c / safe
+        return self.reflectance * (f + (1 - f) ** 2 * c**2 * f / safe), (1 - f) ** 2 * c / safe
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
         same_side = wi[:, 2:] > 0
         up = np.where(same_side, wi, mirrored_below(wi))
         f, _ = fresnel.dielectric(np.abs(dot(wo, halfway(wo, up))), self.eta)
         back, on = self.parts(f)
-        mirrored = reflection(wo, up, self.alpha)[:, None]
+        mirrored = reflection(wo, up, self.alpha, *self.facets)[:, None]
         passed = on * mirrored if self.thin else self._refracted(wo, wi)
         once = np.where(self.rough[:, None], np.where(same_side, back * mirrored, passed), 0.0)
         return np.asarray(once * self._raised(wo, wi) + self._later(wo, wi))
@@ -87,9 +89,9 @@ class Glass(Scattering):
         cos_o, cos_i = dot(wo, h), dot(wi, h)
         crosses = (cos_o > 0) & (cos_i < 0) & (wi[:, 2] < 0)
         _, on = self.parts(fresnel.dielectric(np.abs(cos_o), self.eta)[0])
-        g = shadowing(wo[:, 2], np.maximum(-wi[:, 2], 1e-300), self.alpha)
+        g = shadowing(wo[:, 2], np.maximum(-wi[:, 2], 1e-9), self.alpha, *self.facets)
         stretch = np.where(crosses, (cos_o + self.eta * cos_i) ** 2, 1)
-        f = np.abs(cos_i * cos_o) / wo[:, 2] * distribution(h, self.alpha) * g / stretch
+        f = np.abs(cos_i * cos_o) / wo[:, 2] * distribution(h, self.alpha, self.facets[0]) * g / stretch
         return on * np.where(crosses, f, 0)[:, None]
 
     def sample(self, wo: Doubles, rng: np.random.Generator) -> Sample:
@@ -118,13 +120,15 @@ class Glass(Scattering):
             bundled = 1 / eta**2
         wi = np.where(returns, reflected(wo, h), through)
         weight = np.where(returns, back / chance[:, None], on * bundled / np.maximum(1 - chance, 1e-300)[:, None])
-        return Sample(wi, weight * self._seen(wo, wi, returns[:, 0])[:, None])
+        return Sample(wi, weight * self._seen(wo, wi, h, returns[:, 0])[:, None])
 
-    def _seen(self, wo: Doubles, wi: Doubles, returns: Doubles) -> Doubles:
-        """Return G2/G1 of microfacets, 0 if light ends up on the wrong side."""
+    def _seen(self, wo: Doubles, wi: Doubles, h: Doubles, returns: Doubles) -> Doubles:
+        """Return D·G2 of microfacets over D·G1 of the sampled ones, 0 if light ends up on the wrong side."""
         height = np.where(returns, wi[:, 2], -wi[:, 2])
-        own, other = smith_lambda(wo[:, 2], self.alpha), smith_lambda(height, self.alpha)
-        return np.where(height > 0, np.where(self.rough, (1 + own) / (1 + own + other), 1), 0)
+        g2 = shadowing(wo[:, 2], np.maximum(height, 1e-9), self.alpha, *self.facets)
+        ratio = distribution(h, self.alpha, self.facets[0]) / sampled_distribution(h, self.alpha)
+        seen = ratio * g2 * (1 + smith_lambda(wo[:, 2], self.alpha))
+        return np.where(height > 0, np.where(self.rough, seen, 1), 0)
 
 
 def _absorption(material: Dielectric) -> Doubles:
