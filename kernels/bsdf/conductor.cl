@@ -1,6 +1,6 @@
 // A metal with a complex index of refraction eta + i·k: exact Fresnel equations at GGX microfacets, sampled by visible
 // normals. f = F(wi·h)·G·D/(4·cos wi·cos wo), with height-correlated G (SEPARABLE_CONDUCTOR: or separable); single
-// bounce. Local frame.
+// bounce. ANISOTROPIC_CONDUCTOR: with two roughnesses, along and across the surface's tangent. Local frame.
 //
 // Measured metals are published as eta and k, with which Fresnel's equations are exact in each channel. F0 with a tint
 // at 82° (Hoffman 2019; Kutz et al. 2021) would fit these curves, but needs a fit for every metal.
@@ -8,9 +8,14 @@
 #include "bsdf/interface.cl"
 #include BECKMANN_FILE
 
+#if ANISOTROPIC_CONDUCTOR
+// x, y: the tangent in the local frame, of unit length; stretch: √(alpha along it over alpha across it).
+typedef struct { real x, y, stretch; } Brush;
+#endif
+
 struct conductor {
     real3 eta, k;
-    real alpha;
+    real alpha;         // of anisotropic metal the geometric mean
 #if TINTED_CONDUCTOR
     real3 reflectance;
 #endif
@@ -20,12 +25,47 @@ struct conductor {
 #if SEPARABLE_CONDUCTOR
     ireal separable;    // whether G is
 #endif
+#if ANISOTROPIC_CONDUCTOR
+    Brush brush;
+#endif
 };
+
+#if ANISOTROPIC_CONDUCTOR
+static inline Brush brush_at(const Surface *surface, real along, real across) {
+    real3 n = choose(surface->front, surface->ns, negate(surface->ns));     // as before it was turned to the viewer
+    real3 t = to_local(frame_around(surface->ns), sub(surface->tangent, scale(n, dot3(surface->tangent, n))));
+    real length2 = t.x * t.x + t.y * t.y;
+    ireal known = (surface->handedness != 0.0f) & (length2 > 0.0f);
+    real inverse = rsqrt(known ? length2 : ONE);
+    return (Brush){known ? t.x * inverse : ONE, known ? t.y * inverse : ZERO, known ? sqrt(along / across) : ONE};
+}
+
+// From the local frame to that of the tangent, and back. Microfacets of two alphas are those of their geometric mean,
+// stretched: Lambda(w) is that of the stretched w, D(h) that of the squeezed h.
+static inline real3 to_brush(const Brush *b, real3 w) {
+    return vector(b->x * w.x + b->y * w.y, b->x * w.y - b->y * w.x, w.z);
+}
+static inline real3 from_brush(const Brush *b, real3 w) {
+    return vector(b->x * w.x - b->y * w.y, b->x * w.y + b->y * w.x, w.z);
+}
+static inline real3 stretch(const Brush *b, real3 w) { return vector(w.x * b->stretch, w.y / b->stretch, w.z); }
+static inline real3 squeeze(const Brush *b, real3 h) { return vector(h.x / b->stretch, h.y * b->stretch, h.z); }
+#define STRETCHED_METAL(m, w) stretch(&(m)->brush, to_brush(&(m)->brush, w))
+#define SQUEEZED_METAL(m, h) squeeze(&(m)->brush, to_brush(&(m)->brush, h))
+#else
+#define STRETCHED_METAL(m, w) w
+#define SQUEEZED_METAL(m, h) h
+#endif
 
 static inline struct conductor conductor_at(const Scene *scene, ireal index, const Surface *surface) {
     real roughness = PARAMETER(conductor, roughness);
-    return (struct conductor){PARAMETER3(conductor, eta), PARAMETER3(conductor, k),
-                              maximum(roughness * roughness, (real)(ALPHA_MIN))
+    real alpha = maximum(roughness * roughness, (real)(ALPHA_MIN));
+#if ANISOTROPIC_CONDUCTOR
+    real other = PARAMETER(conductor, roughness_across), along = alpha;
+    real across = PARAMETER(conductor, anisotropic) > 0.0f ? maximum(other * other, (real)(ALPHA_MIN)) : along;
+    alpha = sqrt(along * across);
+#endif
+    return (struct conductor){PARAMETER3(conductor, eta), PARAMETER3(conductor, k), alpha
 #if TINTED_CONDUCTOR
                               , PARAMETER3(conductor, reflectance)
 #endif
@@ -34,6 +74,9 @@ static inline struct conductor conductor_at(const Scene *scene, ireal index, con
 #endif
 #if SEPARABLE_CONDUCTOR
                               , PARAMETER(conductor, separable) > 0.0f
+#endif
+#if ANISOTROPIC_CONDUCTOR
+                              , brush_at(surface, along, across)
 #endif
     };
 }
@@ -63,9 +106,12 @@ static inline real3 conductor_fresnel(const struct conductor *m, real cos_o) {
 
 static inline BsdfValue conductor_eval(const struct conductor *m, real3 wo, real3 wi) {
     real3 sum = add(wo, wi);
-    real length = length3(sum), lambda_o = ggx_lambda(wo, m->alpha), lambda_i = ggx_lambda(wi, m->alpha);
+    real length = length3(sum);
+    real3 h = SQUEEZED_METAL(m, scale(sum, 1.0f / length));
+    real3 stretched_o = STRETCHED_METAL(m, wo), stretched_i = STRETCHED_METAL(m, wi);
+    real lambda_o = ggx_lambda(stretched_o, m->alpha), lambda_i = ggx_lambda(stretched_i, m->alpha);
     real3 f = conductor_fresnel(m, 0.5f * length);     // of wi·h = wo·h
-    real visible = ggx_d(scale(sum, 1.0f / length), m->alpha) / (4.0f * wo.z * (1.0f + lambda_o));
+    real visible = ggx_d(h, m->alpha) / (4.0f * wo.z * (1.0f + lambda_o));
     real seen = visible * (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i);
 #if SEPARABLE_CONDUCTOR
 #define SEPARABLE(m) ((m)->separable)
@@ -74,7 +120,7 @@ static inline BsdfValue conductor_eval(const struct conductor *m, real3 wo, real
 #define SEPARABLE(m) NO_LANES
 #endif
 #if BECKMANN_CONDUCTOR
-    real beckmann = beckmann_d(scale(sum, 1.0f / length), m->alpha) * beckmann_masking(wo, wi, m->alpha, SEPARABLE(m));
+    real beckmann = beckmann_d(h, m->alpha) * beckmann_masking(stretched_o, stretched_i, m->alpha, SEPARABLE(m));
     seen = m->beckmann ? beckmann / (4.0f * wo.z) : seen;
 #endif
     return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), (BsdfValue){scale(f, seen), splat(ZERO), visible}, no_value());
@@ -83,7 +129,10 @@ static inline BsdfValue conductor_eval(const struct conductor *m, real3 wo, real
 static inline real3 conductor_albedo(const struct conductor *m) { return conductor_fresnel(m, ONE); }
 
 static inline BsdfSample conductor_sample(const struct conductor *m, real3 wo, real2 u, real lobe) {
-    real3 h = sample_visible_normal(wo, m->alpha, u);
+    real3 h = sample_visible_normal(STRETCHED_METAL(m, wo), m->alpha, u);
+#if ANISOTROPIC_CONDUCTOR
+    h = from_brush(&m->brush, normalize3(stretch(&m->brush, h)));
+#endif
     BsdfSample sample = no_sample();
     sample.wi = sub(scale(h, 2.0f * dot3(wo, h)), wo);
     weigh_sample(&sample, conductor_eval(m, wo, sample.wi), ALL_LANES);

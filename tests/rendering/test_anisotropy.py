@@ -15,7 +15,7 @@ from clrt.device.open import Device
 from clrt.errors import SceneError
 from clrt.scene.lights import DirectionalLight
 from clrt.scene.materials import anisotropy_energy
-from clrt.scene.materials.material_types import MetallicRoughness
+from clrt.scene.materials.material_types import Conductor, MetallicRoughness
 from clrt.scene.materials.textures import Channel, Picture, Texture
 from clrt.scene.model import Camera, Mesh, RenderSettings, Scene
 from clrt.scene.validation.validate import validate
@@ -222,6 +222,38 @@ def test_surfaces_without_coordinates_are_isotropic(device: Device) -> None:
     found = lit(device, mesh, (0.0, 0.5, 5.0), tuple(light))
     v = np.array([0.0, 0.5, 5.0]) / np.sqrt(25.25)
     np.testing.assert_allclose(found, specular(0.3, 0.0, *axes(0), v, light) * light[2], rtol=4e-3)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_brushed_conductors(device: Device, side: float, turned: bool) -> None:
+    """`roughness` is along u, `roughness_across` across it; without coordinates alpha is their geometric mean."""
+    metal = Conductor(eta=(0.01,) * 3, k=(100.0,) * 3, roughness=0.6, roughness_across=0.3)
+    strength = np.sqrt((0.6**2 - 0.3**2) / (1 - 0.3**2))
+    v, light = np.array([0.3, 0.5, side]), np.array([0.4, -0.2, side])
+    v, light = v / np.linalg.norm(v), light / np.linalg.norm(light)
+    uv = np.roll(UV, 1, axis=0) if turned else UV
+    found = lit(
+        device, Mesh(SQUARE, np.array([[0, 1, 2], [0, 2, 3]], np.int32), metal, uv=uv), tuple(5 * v), tuple(light)
+    )
+    t, b, n = axes(90 if turned else 0)
+    expected = specular(0.3, strength, t, b, side * n, v, light) * abs(light[2])
+    np.testing.assert_allclose(found, expected, rtol=4e-3)
+    found = lit(device, Mesh(SQUARE, np.array([[0, 1, 2], [0, 2, 3]], np.int32), metal), tuple(5 * v), tuple(light))
+    expected = specular(np.sqrt(0.3 * 0.6), 0.0, t, b, side * n, v, light) * abs(light[2])
+    np.testing.assert_allclose(found, expected, rtol=4e-3)
+
+
+def test_a_texture_of_the_roughness_across(device: Device) -> None:
+    """Equal to the number that it stands for; and equal roughnesses are isotropic, next to others as well."""
+    texture = Texture(picture=Picture(np.full((1, 1, 4), 153, np.uint8)))
+    given: list[Any] = [Conductor(roughness_across=across) for across in (0.6, texture, 0.3, None)]
+    assert given[1].without_textures().roughness_across == 1.0
+    found, wo, wi = bsdfs(device, given), above(500, 3), above(500, 4)
+    number, textured, even, plain = (found.value(which, wo, wi)[0] for which in range(4))
+    np.testing.assert_allclose(textured, number, rtol=1e-5)
+    np.testing.assert_allclose(even, plain, rtol=1e-5)
+    assert np.abs(number / plain - 1).max() > 0.1
 
 
 def test_other_masking_terms_are_refused() -> None:

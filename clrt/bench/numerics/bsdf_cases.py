@@ -72,6 +72,10 @@ LAYERS: dict[str, tuple[dict[str, Any], ...]] = {
         },
     ),
     "plastic": ({"ior": 2.0},),
+    "conductor": (
+        {"roughness": 0.6, "roughness_across": 0.3},
+        {"roughness": 0.3, "roughness_across": 0.7},
+    ),
     "dielectric": (
         {"multiple_scattering": False},
         {"roughness": 0.0, "dispersion": 2.0},

@@ -278,6 +278,8 @@ def _conductor(material: Conductor) -> Plugin:
     values = material.parameters()
     plugin = {"type": "roughconductor", "eta": rgb(values["eta"]), "k": rgb(values["k"])}
     plugin |= {"specular_reflectance": color(material.reflectance)} if "reflectance" in values else {}
+    if material.roughness_across is not None:
+        raise ValueError("anisotropic metal, whose directions follow texture coordinates")
     return _rough(plugin, material)
 
 

@@ -15,11 +15,12 @@ UNEVEN = 1e-5
 
 
 def sphere_at(to_world: NDArray[np.float64], material: Material, name: str) -> Sphere | None:
-    """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or if it is textured."""
+    """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or has texture coordinates."""
     linear = to_world[:3, :3]
     squares = linear.T @ linear
     radius = float(np.cbrt(abs(np.linalg.det(linear))))
-    if material.textures() or np.abs(squares - radius**2 * np.eye(3)).max() > UNEVEN * radius**2:
+    mapped = material.textures() or material.bent_by
+    if mapped or np.abs(squares - radius**2 * np.eye(3)).max() > UNEVEN * radius**2:
         return None
     x, y, z = to_world[:3, 3].tolist()
     return Sphere(center=(x, y, z), radius=radius, material=material, name=name)

@@ -148,7 +148,11 @@ def _texture_roles(kind: type) -> dict[str, TextureRole]:
         if Texture in accepted:
             is_color = any(get_origin(part) is tuple for part in accepted)
             roles[name] = (
-                TextureRole.MAP if NoneType in accepted else TextureRole.COLOR if is_color else TextureRole.NUMBER
+                TextureRole.MAP
+                if {*accepted} == {Texture, NoneType}
+                else TextureRole.COLOR
+                if is_color
+                else TextureRole.NUMBER
             )
     return roles
 

@@ -14,7 +14,7 @@ from typing import Annotated, ClassVar, Literal
 from ..fields.limits import Ge, Gt, Le
 from .dielectric_energy import ROWS, tables
 from .material import MOST_IOR, Albedo as Albedo, Material as Material, Parameter, Unit
-from .metallic_roughness import MetallicRoughness as MetallicRoughness
+from .metallic_roughness import ALONG_U, MetallicRoughness as MetallicRoughness
 from .plastic import Distribution, Plastic as Plastic
 from .presets import CONDUCTORS, ConductorPreset
 from .textures import NonNegative, Texture
@@ -41,8 +41,8 @@ class Conductor(Material):
     """Metal with a measured complex index of refraction eta + i·k per channel and a microfacet distribution.
 
     `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². `reflectance`, which
-    measured metals do not have, multiplies what is reflected. `smith`: the masking–shadowing term. Single scattering
-    only.
+    measured metals do not have, multiplies what is reflected. `smith`: the masking–shadowing term. `roughness_across`:
+    that across the tangent, the direction of u on the surface; `roughness` is then along it. Single scattering only.
     """
 
     kernel: ClassVar[str] = "conductor"
@@ -52,6 +52,7 @@ class Conductor(Material):
     k: tuple[Extinction, Extinction, Extinction] | None = None
     roughness: Unit | Texture = 0.3
     reflectance: Albedo | Texture = (1.0, 1.0, 1.0)
+    roughness_across: Unit | Texture | None = None
     distribution: Distribution = "ggx"
     smith: SmithTerm = "height_correlated"
 
@@ -61,10 +62,18 @@ class Conductor(Material):
         has = self.features()
         values |= {"reflectance": self.reflectance} if "TINTED_CONDUCTOR" in has else {}
         values |= {"beckmann": 1.0} if "BECKMANN_CONDUCTOR" in has else {}
-        return values | ({"separable": 1.0} if "SEPARABLE_CONDUCTOR" in has else {})
+        values |= {"separable": 1.0} if "SEPARABLE_CONDUCTOR" in has else {}
+        if self.roughness_across is not None:
+            values |= {"roughness_across": self.roughness_across, "anisotropic": 1.0}
+        return values
+
+    @property
+    def bent_by(self) -> Texture | None:
+        return self.normal_map or (None if self.roughness_across is None else ALONG_U)
 
     def features(self) -> frozenset[str]:
         has = {"TINTED_CONDUCTOR": self.reflectance != WHITE, "SEPARABLE_CONDUCTOR": self.smith == "separable"}
+        has["ANISOTROPIC_CONDUCTOR"] = self.roughness_across is not None
         has |= dict.fromkeys(("BECKMANN", "BECKMANN_CONDUCTOR"), self.distribution == "beckmann")
         return frozenset(name for name, present in has.items() if present)
 
