@@ -194,6 +194,34 @@ def test_environment_maps_may_be_rotated_about_any_axis(mirrored: bool) -> None:
     np.testing.assert_allclose(image, 1 + world @ matrix, atol=2e-4)
 
 
+def test_a_scaled_texture(folder: Path) -> None:
+    """Mitsuba 0.x's `scale`, a texture times a color, of which a number takes the luminance."""
+    write_image(folder / "a.png", np.full((1, 1, 3), 0.5, np.float32))
+    text = """<shape type="rectangle"><bsdf type="{}"><texture name="{}" type="scale">
+        <rgb name="scale" value="0.2, 0.4, 0.8"/><texture type="bitmap"><string name="filename" value="a.png"/>
+        </texture></texture>{}</bsdf></shape>"""
+    color = old(folder, text.format("diffuse", "reflectance", "")).meshes[0].material
+    assert isinstance(color, Diffuse) and isinstance(color.color, Texture) and color.color.factor == (0.2, 0.4, 0.8)
+    opacity = old(folder, text.format("mask", "opacity", '<bsdf type="diffuse"/>')).meshes[0].material.opacity
+    assert isinstance(opacity, Texture) and opacity.factor == pytest.approx(
+        0.2 * 0.2127 + 0.4 * 0.7152 + 0.8 * 0.0722, rel=1e-3
+    )
+
+
+def test_a_missing_ply_file_and_zero_normals(folder: Path) -> None:
+    """A missing file is named like others; a vertex whose normal is zero gets the smooth one."""
+    shape = '<shape type="ply"><string name="filename" value="a.ply"/></shape>'
+    assert "a.ply: no such model file" in problem(folder, shape)
+    vertices = "0 0 0 0 0 0\n1 0 0 0 1 0\n0 1 0 0 1 0\n"
+    header = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
+    (folder / "a.ply").write_text(
+        f"ply\nformat ascii 1.0\nelement vertex 3\n{header}element face 1\nproperty list uchar int vertex_indices\n"
+        f"end_header\n{vertices}3 0 1 2\n"
+    )
+    normals = scene(folder, shape).meshes[0].normals
+    np.testing.assert_allclose(normals, [[0, 0, 1], [0, 1, 0], [0, 1, 0]])  # type: ignore[arg-type]
+
+
 def test_a_rotation_about_y_is_not_resampled(folder: Path) -> None:
     write_image(folder / "sky.exr", np.random.default_rng(1).random((4, 8, 3), np.float32))
     text = """<emitter type="envmap"><string name="filename" value="sky.exr"/><transform name="to_world">{}
@@ -213,6 +241,7 @@ STAND_INS = [
     ('<bsdf type="roughplastic"><string name="distribution" value="phong"/></bsdf>', "GGX of the same alpha"),
     ('<bsdf type="twosided"><bsdf type="diffuse"/><bsdf type="diffuse"/></bsdf>', "the first is used"),
     ('<bsdf type="diffuse"><float name="shine" value="1"/></bsdf>', "ignored"),
+    ('<bsdf type="plastic"><rgb name="diffuse_reflectance" value="255, 0, 9"/></bsdf>', "1 is used"),
     ('<bsdf type="dielectric"/><medium name="interior" type="homogeneous"/>', "left out"),
     ('<emitter type="sunny"/>', "left out"),
 ]

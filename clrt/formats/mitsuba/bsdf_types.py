@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .bsdfs import blend, conductor, dielectric, diffuse, mask, normalmap, twosided
+from .bsdfs import blend, bumpmap, conductor, dielectric, diffuse, mask, normalmap, twosided
 from .materials import Convert
 from .plastics import plastic
 from .stand_ins import STAND_INS, phong
@@ -12,6 +12,7 @@ TYPES: dict[str, Convert] = {
     "twosided": twosided,
     "mask": mask,
     "normalmap": normalmap,
+    "bumpmap": bumpmap,
     "blendbsdf": blend,
     "dielectric": dielectric,
     "thindielectric": dielectric,

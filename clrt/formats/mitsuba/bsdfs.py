@@ -15,6 +15,7 @@ from ...scene.materials.material_types import Conductor, Dielectric, Diffuse, Ma
 from ...scene.materials.plastic import Distribution
 from ...scene.materials.textures import Texture
 from ..scene_parts.refractive_indices import DIELECTRICS, METALS, Triple
+from .bumps import Bump
 from .materials import WHITE, MaterialReader, ShapeMaterial
 from .textures import Attribute
 from .values import rgb
@@ -51,12 +52,35 @@ def mask(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     return look._replace(material=replace(look.material, opacity=opacity))
 
 
-def normalmap(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
+def bumpmap(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
+    """Read the heights; the shape that has the BSDF makes a normal map of them."""
+    look = _perturbed(reader, plugin, "bump map")
+    scale = plugin.value("scale", float, 1.0)
+    textures = plugin.all("texture")
+    if len(textures) != 1:
+        raise SceneError(f"{plugin.at}: contains {len(textures)} textures; write one")
+    owner = plugin
+    if textures[0].kind == "scale":  # Mitsuba 0.x's
+        owner = textures[0]
+        scale *= owner.value("scale", float, 1.0)
+    heights = reader.textures.heights(owner)
+    if "mirror" in heights.wrap:
+        plugin.refuse("its texture is mirrored", 'write wrap_mode "repeat" or "clamp"', "bumpmap, mirror")
+    return look._replace(bump=Bump(plugin, heights, scale))
+
+
+def _perturbed(reader: MaterialReader, plugin: Plugin, what: str) -> ShapeMaterial:
+    """Return the BSDF within one that perturbs normals, and note how clrt differs."""
     shadowed = plugin.value("use_shadowing_function", bool, True)
     plugin.value("flip_invalid_normals", bool, True)
     look = reader.only(plugin)
     if not (shadowed and type(look.material) is Diffuse):
-        reader.notes.differ(plugin, "normal map that shadows diffuse reflection, and nothing else")
+        reader.notes.differ(plugin, f"{what} that shadows diffuse reflection, and nothing else")
+    return look
+
+
+def normalmap(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
+    look = _perturbed(reader, plugin, "normal map")
     normals = reader.textures.normals(plugin, "normalmap")
     if not np.allclose(normals.image_axes, np.eye(2)):
         reader.notes.differ(plugin, "a normal map is oriented by its image, rotated by to_uv; in Mitsuba by u")
@@ -120,8 +144,9 @@ def conductor(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     if plugin.kind == "conductor":
         reader.notes.differ(plugin, "smooth metal has alpha 0.0001, and reflects point-like lights")
         return ShapeMaterial(metal)
-    roughness, distribution = roughness_of(reader, plugin), distribution_of(reader, plugin)
-    return ShapeMaterial(replace(metal, roughness=roughness, distribution=distribution, smith="separable"))
+    roughness, across = roughnesses_of(reader, plugin)
+    metal = replace(metal, roughness=roughness, roughness_across=across, smith="separable")
+    return ShapeMaterial(replace(metal, distribution=distribution_of(reader, plugin)))
 
 
 def _limited(parts: Triple, factor: float, least: float) -> Triple:
@@ -148,22 +173,31 @@ def distribution_of(reader: MaterialReader, plugin: Plugin) -> Distribution:
 
 def roughness_of(reader: MaterialReader, plugin: Plugin) -> float | Texture:
     """Return √alpha of an isotropic distribution."""
+    along, across = roughnesses_of(reader, plugin)
+    if across is None:
+        return along
+    reader.notes.instead(
+        plugin,
+        "alpha differs in u and v",
+        "write one number for alpha",
+        "their geometric mean is used, or a texture",
+        f"{plugin.kind}, anisotropic",
+    )
+    if isinstance(along, Texture) or isinstance(across, Texture):
+        return along if isinstance(along, Texture) else across
+    return sqrt(along * across)
+
+
+def roughnesses_of(reader: MaterialReader, plugin: Plugin) -> tuple[float | Texture, float | Texture | None]:
+    """Return √alpha along u, and along v if it differs."""
     plugin.value("sample_visible", bool, True)
-    if {"alpha_u", "alpha_v"} & {*plugin.values, *dict(plugin.children)}:
-        alpha, other = (reader.number(plugin, name, 0.1) for name in ("alpha_u", "alpha_v"))
-    else:
-        alpha = other = reader.number(plugin, "alpha", 0.1)
-    if alpha != other:
-        reader.notes.instead(
-            plugin,
-            "alpha differs in u and v",
-            "write one number for alpha",
-            "their geometric mean is used, or a texture",
-            f"{plugin.kind}, anisotropic",
-        )
-        if isinstance(alpha, float):
-            alpha = other if isinstance(other, Texture) else sqrt(alpha * other)
-    return reader.textures.baked(alpha, "number", np.sqrt) if isinstance(alpha, Texture) else sqrt(alpha)
+    names = ("alpha_u", "alpha_v") if {"alpha_u", "alpha_v"} & {*plugin.values, *dict(plugin.children)} else ("alpha",)
+    alphas = [reader.number(plugin, name, 0.1) for name in names]
+    along, across = [
+        reader.textures.baked(alpha, "number", np.sqrt) if isinstance(alpha, Texture) else sqrt(alpha)
+        for alpha in (alphas[0], alphas[-1])
+    ]
+    return along, None if alphas[0] == alphas[-1] else across
 
 
 def index(plugin: Plugin, name: str, default: str) -> float:

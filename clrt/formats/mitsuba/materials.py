@@ -9,6 +9,7 @@ from ...errors import SceneError
 from ...scene.materials.material_types import Material
 from ...scene.materials.textures import Texture
 from ..scene_parts.notes import Notes
+from .bumps import Bump
 from .textures import Attribute, TextureReader
 from .xml import Plugin
 
@@ -16,10 +17,11 @@ WHITE = (1.0, 1.0, 1.0)
 
 
 class ShapeMaterial(NamedTuple):
-    """A material, and the mesh attribute that multiplies its color, if any."""
+    """A material; the mesh attribute that multiplies its color, and the bump map of its surface, if any."""
 
     material: Material
     attribute: Attribute | None = None
+    bump: Bump | None = None
 
 
 class MaterialReader:

@@ -13,13 +13,15 @@ from ...scene.geometry.normals import smooth_normals
 from ...scene.geometry.transform import transform_mesh, unit
 from ...scene.materials.material import Material
 from ...scene.materials.material_types import Diffuse
-from ...scene.model import Instance, Mesh, Sphere
+from ...scene.model import FloatArray, Instance, Mesh, Sphere
 from ..models import read_model
 from ..ply.mesh_attributes import Attributes, mesh_with_attributes
+from ..referenced_files import check_file
 from ..scene_parts.notes import Notes, UnsupportedError
 from ..scene_parts.spheres import inside_out, sphere_at
 from ..toml.instance_table import placed
 from .bsdfs import absorbing
+from .bumps import sizes_over
 from .materials import MaterialReader, ShapeMaterial
 from .primitives import cube, cylinder, disk, rectangle, sphere
 from .serialized import read_serialized
@@ -82,7 +84,7 @@ class ShapeReader:
             to_world = to_world @ _ball(plugin)
             flips ^= mirrored
             inwards = flips and (any(look.material.radiance) or "TRANSMISSION" in look.material.features())
-            if not inwards and (ball := sphere_at(to_world, look.material, plugin.where)):
+            if not (inwards or look.bump) and (ball := sphere_at(to_world, look.material, plugin.where)):
                 yield ball
                 return
         elif plugin.kind == "cylinder":
@@ -96,7 +98,22 @@ class ShapeReader:
             pieces = list(_from_file(plugin, mirrored))
         for mesh, attributes in pieces:
             placed = transform_mesh(inside_out(mesh) if flips else mesh, to_world)
-            yield _dressed(placed, look, attributes, plugin)
+            yield _dressed(placed, self._bumped(placed, look, plugin), attributes, plugin)
+
+    def _bumped(self, mesh: Mesh, look: ShapeMaterial, plugin: Plugin) -> ShapeMaterial:
+        """Return the look with the normal map that its bump map is on this mesh."""
+        if look.bump is None or mesh.uv is None:
+            return look
+        sizes = sizes_over(mesh, look.bump.heights)
+        if not sizes.even and sizes.texels is None:
+            self._notes.instead(
+                look.bump.plugin,
+                "is repeated on a shape in different sizes",
+                "write a normalmap",
+                "its size is the median over each shape",
+                "bumpmap, uneven texture coordinates",
+            )
+        return look._replace(material=replace(look.material, normal_map=self._textures.bumped(look.bump, sizes)))
 
     def _look(self, plugin: Plugin) -> ShapeMaterial:
         """Return the material of the shape's BSDF and interior medium; or `stand_in` if it is not supported."""
@@ -204,6 +221,8 @@ def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attribute
     path = Path(plugin.value("filename", str, ""))
     flat = plugin.value("face_normals", bool, False)
     downward = plugin.value("flip_tex_coords", bool, plugin.kind == "obj")
+    if plugin.kind == "ply":
+        check_file(path, "model")
     own = mesh_with_attributes(path) if plugin.kind == "ply" else None
     if plugin.kind == "serialized":
         mesh, flat_itself = read_serialized(path, plugin.value("shape_index", int, 0))
@@ -216,8 +235,8 @@ def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attribute
             mesh.normals = None
         if mirrored and mesh.normals is None:
             mesh = inside_out(mesh)
-        if not flat and mesh.normals is None:
-            mesh.normals = smooth_normals(mesh.vertices, mesh.faces)
+        if not flat:
+            mesh.normals = _whole_normals(mesh)
         yield mesh, attributes
 
 
@@ -226,11 +245,20 @@ def _in_file(path: Path) -> list[Mesh]:
     return placed(read_model(path), np.eye(4), None, {}).meshes
 
 
+def _whole_normals(mesh: Mesh) -> FloatArray:
+    """Return the mesh's normals, smooth ones where it has none or zeros."""
+    own = np.zeros_like(mesh.vertices) if mesh.normals is None else mesh.normals
+    given = np.any(own, axis=1, keepdims=True)
+    return own if given.all() else np.where(given, own, smooth_normals(mesh.vertices, mesh.faces))
+
+
 def _dressed(mesh: Mesh, look: ShapeMaterial, attributes: Attributes, plugin: Plugin) -> Mesh:
     """Return the mesh with its material, and the colors of an attribute; a face attribute splits shared vertices."""
     mesh = replace(mesh, material=look.material, name=plugin.where)
-    if mesh.uv is None and look.material.textures():
-        raise SceneError(f"{plugin.at}: has a texture but no texture coordinates; add them to the file")
+    if mesh.uv is None and (look.material.textures() or look.material.bent_by or look.bump):
+        raise SceneError(
+            f"{plugin.at}: has a texture, or alpha_u and alpha_v, but no texture coordinates; add them to the file"
+        )
     if look.attribute is None:
         return mesh
     name, low, high = look.attribute

@@ -82,7 +82,6 @@ def _color(reader: MaterialReader, plugin: Plugin) -> Any:
 
 STAND_INS: dict[str, Convert] = {
     "principled": principled,
-    "bumpmap": nested,
     "coating": nested,
     "roughcoating": nested,
     "mixturebsdf": nested,

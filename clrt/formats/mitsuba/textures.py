@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+from dataclasses import replace
 from math import atan2, degrees, hypot
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ...errors import SceneError
 from ...scene.materials.textures import Picture, Texture, Wrap
 from ..scene_parts.notes import Notes
 from ..scene_parts.texture_images import LUMINANCE, Curve, TextureImages, checks
+from .bumps import Bump, Sizes, finer, normal_map
 from .values import Doubles, rgb
 from .xml import Plugin
 
@@ -42,16 +46,20 @@ class TextureReader:
         self._notes = notes
         self._images = TextureImages()
         self.baked = self._images.baked
+        self._normals: dict[Hashable, Texture] = {}
 
     def color(self, owner: Plugin, name: str, default: float, *, emitted: bool = False) -> Any:
         """Read a color: three numbers, a Texture or an Attribute."""
         child = owner.child(name)
         if child is None:
-            return rgb(owner.color(name, default), emitted=emitted, bounded=not emitted)
+            value = rgb(owner.color(name, default), emitted=emitted, bounded=not emitted)
+            return value if emitted else self._reflectance(owner, name, value)
         if child.kind == "checkerboard":
             return self._checkerboard(child, encoded=True)
         if child.kind == "mesh_attribute":
             return Attribute(child.value("name", str, ""))
+        if child.kind == "scale":
+            return self._scaled(child, "color")
         return self._bitmap(child, "color")
 
     def number(self, owner: Plugin, name: str, default: float) -> Any:
@@ -64,6 +72,8 @@ class TextureReader:
             return self._checkerboard(child, encoded=False)
         if child.kind == "mesh_attribute":
             return Attribute(child.value("name", str, ""))
+        if child.kind == "scale":
+            return self._scaled(child, "number")
         return self._bitmap(child, "number")
 
     def normals(self, owner: Plugin, name: str) -> Texture:
@@ -77,6 +87,30 @@ class TextureReader:
             texels[..., :3] = np.round(np.array([x, y, z]) * 255)
             return Texture(picture=Picture(texels, "normal"))
         return self._bitmap(child, "normal")
+
+    def _reflectance(self, owner: Plugin, name: str, value: tuple[float, float, float]) -> tuple[float, float, float]:
+        """Return a color of at most 1, as some files write 0 to 255."""
+        if max(value) <= 1:
+            return value
+        what = f"{name} {max(value):g} is above 1"
+        self._notes.instead(owner, what, "write fractions from 0 to 1", "1 is used", f"{name} above 1")
+        red, green, blue = (min(part, 1.0) for part in value)
+        return red, green, blue
+
+    def _scaled(self, plugin: Plugin, use: Literal["color", "number"]) -> Texture:
+        """Read Mitsuba 0.x's `scale`, a texture times a number or a color."""
+        inner = plugin.all("texture")
+        if len(inner) != 1:
+            raise SceneError(f"{plugin.at}: contains {len(inner)} textures; write one")
+        texture = self._bitmap(inner[0], use)
+        by = rgb(plugin.color("scale", 1.0))
+        red, green, blue = (factor * part for factor, part in zip(np.broadcast_to(texture.factor, 3).tolist(), by))
+        return replace(texture, factor=(red, green, blue) if use == "color" else float(LUMINANCE @ (red, green, blue)))
+
+    def heights(self, owner: Plugin) -> Texture:
+        """Read the one texture of a plugin as numbers."""
+        (plugin,) = owner.all("texture")
+        return self._bitmap(plugin, "number")
 
     def _bitmap(self, plugin: Plugin, use: Literal["color", "number", "normal"]) -> Texture:
         if plugin.kind != "bitmap":
@@ -102,6 +136,19 @@ class TextureReader:
         if gamma not in (1, SRGB, -1):
             self._notes.instead(plugin, f"gamma is {gamma:g}", "write 1 or leave it out", "sRGB is used", "gamma")
         return gamma == 1
+
+    def bumped(self, bump: Bump, sizes: Sizes) -> Texture:
+        """Return the normal map of a bump map on a surface where its image has these sizes; shared if they are even."""
+        size = sizes.texels or sizes.median
+        key = bump.heights.picture, bump.heights.factor, bump.heights.wrap, bump.scale, *map(float, sizes.median)
+        if sizes.texels or key not in self._normals:
+            self._images.count(finer(bump.heights) ** 2 * bump.heights.picture.texels.nbytes)
+            made = normal_map(bump, size)
+        else:
+            made = self._normals[key]
+        if sizes.texels is None:
+            self._normals[key] = made
+        return replace(bump.heights, picture=made.picture, factor=made.factor, filter="linear")
 
     def _checkerboard(self, plugin: Plugin, *, encoded: bool) -> Texture:
         """Return 2x2 texels, with factors that make the brighter color exact and the other as close as 8 bits allow."""

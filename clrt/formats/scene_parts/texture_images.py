@@ -54,13 +54,17 @@ class TextureImages:
         factors = np.broadcast_to(texture.factor, 3)
         table = function(np.clip(levels[:, None] * factors, 0, 1).astype(np.float64)).astype(np.float32)
         table = np.round((srgb_from_linear(table) if use == "color" else table) * 255).astype(np.uint8)
-        self._baked += texture.picture.texels.nbytes
-        if self._baked > MOST_BAKED:
-            raise SceneError(f"scene: more than {MOST_BAKED >> 30} GiB of textures are converted; use smaller images")
+        self.count(texture.picture.texels.nbytes)
         texels = texture.picture.texels.copy()
         for channel in range(3):
             texels[..., channel] = table[texels[..., channel], channel]
         return replace(texture, picture=Picture(texels, texture.picture.name), factor=1.0)
+
+    def count(self, size: int) -> None:
+        """Count the bytes of a converted texture. Raises SceneError if they are too many in all."""
+        self._baked += size
+        if self._baked > MOST_BAKED:
+            raise SceneError(f"scene: more than {MOST_BAKED >> 30} GiB of textures are converted; use smaller images")
 
 
 def mean_of(number: float | Texture) -> float:
