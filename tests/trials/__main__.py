@@ -20,6 +20,7 @@ NAMES = (
     "horizon",
     "rough_glass",
     "agreement",
+    "mitsuba_files",
 )
 
 for name in sys.argv[1:] or NAMES:
