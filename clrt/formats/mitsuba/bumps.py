@@ -28,6 +28,8 @@ MOST_TRIANGLES, MOST_TEXELS = 200_000, 1 << 24
 #: The share of the texels that triangles with UNLIKE sizes may have in common, and how far they are beyond an edge.
 SHARED, UNLIKE, ON_EDGE = 0.02, 0.1, 1e-9
 TINY = 1e-300
+#: Twice the smallest area of a triangle in the image, of which it has none otherwise.
+THINNEST = 1e-18
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +66,10 @@ def sizes_over(mesh: Mesh, heights: Texture) -> Sizes:
     at = mesh.uv.astype(np.float64)[mesh.faces] @ heights.to_picture[:, :2].T + heights.to_picture[:, 2]
     edges, steps = (np.stack([each[:, 1] - each[:, 0], each[:, 2] - each[:, 0]], axis=2) for each in (corners, at))
     area = np.linalg.norm(np.cross(edges[..., 0], edges[..., 1]), axis=1)
-    used = (np.abs(np.linalg.det(steps)) > 0) & (area > 0)
+    used = (np.abs(np.linalg.det(steps)) > THINNEST) & (area > 0)
     if not used.any():
         return Sizes(ImageSize(*np.array([1.0, 1.0, 0.0])), False, None)
-    right, down = np.moveaxis(edges[used] @ np.linalg.inv(steps[used]), 2, 0)
+    right, down = np.moveaxis(edges[used] @ _inverses(steps[used]), 2, 0)
     width = np.linalg.norm(right, axis=1)
     lean = -np.sum(right * down, axis=1) / width
     found = ImageSize(width, np.sqrt(np.maximum(np.sum(down**2, axis=1) - lean**2, 0)), lean)
@@ -76,6 +78,12 @@ def sizes_over(mesh: Mesh, heights: Texture) -> Sizes:
     uneven = float(area[used][np.any(off, axis=0)].sum() + area[~used].sum())
     even = uneven <= DEGENERATE * float(area.sum())
     return Sizes(median, even, None if even else _by_texel(found, median, at[used], heights))
+
+
+def _inverses(matrices: Doubles) -> Doubles:
+    """Return the inverses of matrices (n, 2, 2), which numpy refuses if one is singular to rounding."""
+    (a, b), (c, d) = np.moveaxis(matrices, 0, 2)
+    return np.moveaxis(np.array([[d, -b], [-c, a]]) / np.linalg.det(matrices), 2, 0)
 
 
 def _median(values: Doubles, weights: Doubles) -> Doubles:
@@ -91,7 +99,7 @@ def _by_texel(found: ImageSize, median: ImageSize, at: Doubles, heights: Texture
     if len(at) > MOST_TRIANGLES:
         return None
     places = at * (columns, rows) - 0.5
-    inverses = np.linalg.inv(np.stack([places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]], axis=2))
+    inverses = _inverses(np.stack([at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]], axis=2)) / (columns, rows)
     low, high = np.ceil(places.min(axis=1)).astype(int), np.floor(places.max(axis=1)).astype(int) + 1
     if np.prod(np.maximum(high - low, 0), axis=1).max() > MOST_TEXELS:
         return None
