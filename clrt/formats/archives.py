@@ -1,8 +1,9 @@
-"""Checks of ZIP archives (.3mf, .usdz) by their directory, before any of their content is read."""
+"""Checks of ZIP archives (.3mf, .usdz) by their directory, before any of their content is read; gzip files."""
 
 from __future__ import annotations
 
 import zipfile
+import zlib
 from pathlib import Path
 
 from ..errors import SceneError
@@ -34,3 +35,20 @@ def check_archive(path: Path, compressed: bool) -> None:
     most = min(MOST_BYTES, max(FREE_BYTES, MOST_RATIO * stored)) if compressed else stored
     if unpacked > most or sum(entry.compress_size for entry in entries) > stored:
         raise SceneError(f"its {stored} bytes cannot contain {unpacked} bytes of files; export it again")
+
+
+def gunzipped(path: Path) -> bytes:
+    """Return the content of a .gz file, which may unpack to FREE_BYTES, or to MOST_RATIO times its size up to
+    MOST_BYTES. Raises SceneError naming the file."""
+    stored = path.read_bytes()
+    most = min(MOST_BYTES, max(FREE_BYTES, MOST_RATIO * len(stored)))
+    unpacker = zlib.decompressobj(wbits=31)
+    try:
+        content = unpacker.decompress(stored, most + 1)
+    except zlib.error as error:
+        raise SceneError(f"{path}: is not a gzip file, or a damaged one ({error}); compress it again") from None
+    if len(content) > most:
+        raise SceneError(f"{path}: its {len(stored)} bytes unpack to more than {most} bytes; unpack it with gunzip")
+    if not unpacker.eof:
+        raise SceneError(f"{path}: is a gzip file that ends early; compress it again")
+    return content

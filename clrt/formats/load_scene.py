@@ -1,11 +1,11 @@
-"""Scene loading: a TOML scene file, a Mitsuba XML file, or a bare model with a default camera and sky."""
+"""Scene loading: a TOML scene file, a Mitsuba or pbrt scene, or a bare model with a default camera and sky."""
 
 from __future__ import annotations
 
 import logging
 import sys
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -48,15 +48,15 @@ def load(
     approximate: bool = False,
     parameters: Mapping[str, str] = {},
 ) -> Scene:
-    """Load a scene from a .toml file, a Mitsuba .xml file, a model file (whose meshes get a sky, a sun and a camera),
-    or from standard input for "-".
+    """Load a scene from a .toml file, a Mitsuba .xml or pbrt .pbrt file, a model file (whose meshes get a sky, a sun
+    and a camera), or from standard input for "-".
 
     A glTF model's first camera and its lights are used if it has any. camera: name of another camera to use, of a scene
     or a model file, or for a model one of VIEWS. up, unit: of a model file, if they are not as it or its format says;
     choice: for bare models; moving: whether a camera that frames a model frames its animation, as it does if one is
-    chosen; approximate: of a Mitsuba scene, whether what clrt lacks is replaced or left out, with warnings; parameters:
-    of a Mitsuba scene, values of $NAME. Raises one SceneError with all problems of the file, each as "FILE: object:
-    value is wrong; remedy".
+    chosen; approximate: of a Mitsuba or pbrt scene, whether what clrt lacks is replaced or left out, with warnings;
+    parameters: of a Mitsuba scene, values of $NAME. Raises one SceneError with all problems of the file, each as "FILE:
+    object: value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
         raise SceneError(f'{path!r} is not the path of a scene; give a file name, such as "scene.toml"')
@@ -65,16 +65,18 @@ def load(
     _check_types(camera, approximate, parameters)
     path = Path(path)
     check_scene(path)
-    reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower())
-    if approximate and reader is not _load_mitsuba:
-        raise UsageError(f"{path}: approximate is for Mitsuba's scenes; leave it out")
+    reader = _load_toml if path == STDIN else _READERS.get(_suffix(path))
+    if approximate and _suffix(path) not in _APPROXIMATING:
+        raise UsageError(f"{path}: approximate is for Mitsuba's and pbrt's scenes; leave it out")
     if parameters and reader is not _load_mitsuba:
         raise UsageError(f"{path}: -D {next(iter(parameters))}: parameters are for Mitsuba's scenes; leave them out")
     if reader and (up or unit):
         raise UsageError(f'{path}: up and unit are for model files; in a scene file, write up = "z" in a [[mesh]]')
     if reader and choice != DEFAULT:
         raise UsageError(f"{path}: {choice.given()[0]}: is for bare models; leave {choice.given()[0]} out")
-    if reader is _load_mitsuba:
+    if approximate:
+        reader = partial(_APPROXIMATING[_suffix(path)], approximate=True)
+    if parameters:
         reader = partial(_load_mitsuba, approximate=approximate, parameters=parameters)
     scene, problems = reader(path) if reader else (_load_model(path, camera, up, unit, choice, moving), [])
     views = [] if reader else [name for name in VIEWS if name not in scene.cameras]
@@ -103,7 +105,7 @@ def check_scene(path: Path) -> None:
         return
     is_model = path.suffix.lower() in SUFFIXES
     check_file(path, "model" if is_model else "scene")
-    if not is_model and path.suffix.lower() not in _READERS:
+    if not is_model and _suffix(path) not in _READERS:
         raise SceneError(f"{path}: a scene must be one of {', '.join((*_READERS, *SUFFIXES))}; convert it")
 
 
@@ -172,8 +174,20 @@ def _load_mitsuba(path: Path, approximate: bool = False, parameters: Mapping[str
     """Load a Mitsuba scene, logging a warning per model that only approximates Mitsuba's."""
     from .mitsuba.reader import read_mitsuba
 
+    return _warned(path, lambda: read_mitsuba(path, approximate=approximate, parameters=parameters)[:2])
+
+
+def _load_pbrt(path: Path, approximate: bool = False) -> tuple[Scene, list[str]]:
+    """Load a pbrt scene, logging a warning per model that only approximates pbrt's."""
+    from .pbrt.reader import read_pbrt
+
+    return _warned(path, lambda: read_pbrt(path, approximate))
+
+
+def _warned(path: Path, read: Callable[[], tuple[Scene, list[str]]]) -> tuple[Scene, list[str]]:
+    """Return the scene of a reader, and log the differences that it returns. Raises SceneError naming the file."""
     try:
-        scene, differences, _ = read_mitsuba(path, approximate=approximate, parameters=parameters)
+        scene, differences = read()
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
     for difference in differences:
@@ -181,5 +195,13 @@ def _load_mitsuba(path: Path, approximate: bool = False, parameters: Mapping[str
     return scene, []
 
 
-#: Readers of scene files by suffix; those of models are in models.FORMATS.
-_READERS = {".toml": _load_toml, ".xml": _load_mitsuba}
+def _suffix(path: Path) -> str:
+    """Return the suffix in lower case, with that before .gz."""
+    ends = [suffix.lower() for suffix in path.suffixes[-2:]]
+    return "".join(ends if ends[1:] == [".gz"] else ends[-1:])
+
+
+#: Readers that may replace what clrt lacks, and all readers of scene files, by suffix; those of models are in
+#: models.FORMATS.
+_APPROXIMATING = {".xml": _load_mitsuba, ".pbrt": _load_pbrt, ".pbrt.gz": _load_pbrt}
+_READERS = {".toml": _load_toml, **_APPROXIMATING}

@@ -78,15 +78,18 @@ def black_body(kelvin: float) -> tuple[list[float], list[float]]:
 
 
 def rgb_of_spectrum(wavelengths: Sequence[float], values: Sequence[float], *, lit: bool) -> tuple[float, float, float]:
-    """Return linear Rec. 709 of a spectrum given at increasing wavelengths in nm, interpolated linearly and 0 outside.
-    Negative components are clamped to 0.
+    """Return linear Rec. 709 of a spectrum, with negative components clamped to 0; see `xyz_of_spectrum`."""
+    red, green, blue = np.maximum(RGB_FROM_XYZ @ xyz_of_spectrum(wavelengths, values, lit=lit), 0).tolist()
+    return red, green, blue
 
-    lit: the spectrum is a reflectance under D65, and a perfect reflector is (1, 1, 1); otherwise it is a radiance,
-    whose Y is 1 if it is 1 at all wavelengths.
+
+def xyz_of_spectrum(wavelengths: Sequence[float] | Doubles, values: Sequence[float] | Doubles, *, lit: bool) -> Doubles:
+    """Return X, Y and Z of a spectrum given at increasing wavelengths in nm, interpolated linearly and 0 outside.
+
+    lit: the spectrum is a reflectance under D65, and a perfect reflector is (1, 1, 1) in Rec. 709; otherwise it is a
+    radiance, whose Y is 1 if it is 1 at all wavelengths.
     """
     spectrum = np.interp(FINE, wavelengths, values, 0, 0)
     light = np.interp(FINE, WAVELENGTHS, D65) if lit else np.ones_like(FINE)
     matching = np.array([np.interp(FINE, WAVELENGTHS, table) for table in (X, Y, Z)])
-    xyz = matching @ (spectrum * light) / (matching[1] @ light)
-    red, green, blue = np.maximum(RGB_FROM_XYZ @ xyz, 0).tolist()
-    return red, green, blue
+    return np.asarray(matching @ (spectrum * light) / (matching[1] @ light))

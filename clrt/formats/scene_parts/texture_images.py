@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...scene.materials.textures import Picture, Texture
-from ..images.image_reader import linear_from_srgb, read_texels, srgb_from_linear
+from ..images.image_reader import linear_from_srgb, read_picture, read_texels, srgb_from_linear
 
 Doubles = NDArray[np.float64]
 #: Maximum number of bytes of converted textures.
 MOST_BAKED = 2**31
+#: Suffixes of images of floats, which are linear.
+FLOATS = (".exr", ".hdr", ".pfm")
+Triple = tuple[float, float, float]
 #: Conversion of texels from or to sRGB.
 Curve = Literal["", "decode", "encode"]
 #: Luminance weights of Rec. 709.
@@ -45,6 +48,16 @@ class TextureImages:
             self._pictures[file, curve, grey] = Picture(texels, path.stem)
         return self._pictures[file, curve, grey]
 
+    def linear_picture(self, file: str, use: Literal["color", "number"]) -> Picture:
+        """Read an image of floats, which are linear, as texels of 8 bits; what is outside 0 to 1 is clamped."""
+        curve: Curve = "encode" if use == "color" else "decode"
+        if (file, curve, False) not in self._pictures:
+            pixels = np.nan_to_num(read_picture(file)).clip(0, 1)
+            texels = np.full((*pixels.shape[:2], 4), 255, np.uint8)
+            texels[..., :3] = np.round((srgb_from_linear(pixels) if use == "color" else pixels) * 255)
+            self._pictures[file, curve, False] = Picture(texels, Path(file).stem)
+        return self._pictures[file, curve, False]
+
     def baked(
         self, texture: Texture, use: Literal["color", "number"], function: Callable[[Doubles], Doubles]
     ) -> Texture:
@@ -59,6 +72,17 @@ class TextureImages:
         for channel in range(3):
             texels[..., channel] = table[texels[..., channel], channel]
         return replace(texture, picture=Picture(texels, texture.picture.name), factor=1.0)
+
+    def blended(self, amount: Texture, first: Triple, second: Triple, use: Literal["color", "number"]) -> Texture:
+        """Return the texture of two colors, or of two numbers three times, mixed by a texture of numbers."""
+        factor = amount.factor if isinstance(amount.factor, float) else 1.0
+        share = np.clip(np.arange(256) / 255 * factor, 0, 1)[:, None]
+        table = np.clip((1 - share) * np.array(first) + share * np.array(second), 0, 1).astype(np.float32)
+        table = np.round((srgb_from_linear(table) if use == "color" else table) * 255).astype(np.uint8)
+        texels = np.full_like(amount.picture.texels, 255)
+        texels[..., :3] = table[amount.picture.texels[..., 0]]
+        self.count(texels.nbytes)
+        return replace(amount, picture=Picture(texels, amount.picture.name), factor=1.0)
 
     def count(self, size: int) -> None:
         """Count the bytes of a converted texture. Raises SceneError if they are too many in all."""
