@@ -226,7 +226,9 @@ class _Interpreter:
 
     def make_medium(self, each: Directive) -> None:
         """Note a named medium."""
-        self._found.media[each.words[0]] = self._entity(each, each.words[0])
+        kind = each.parameters.get("type")
+        name = str(kind.values[0]) if kind and len(kind.values) else "homogeneous"
+        self._found.media[each.words[0]] = self._entity(each, each.words[0], name)
 
     def texture(self, each: Directive) -> None:
         """Note a texture."""

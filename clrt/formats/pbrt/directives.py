@@ -124,6 +124,8 @@ class Reader:
         if self._included > MOST_INCLUDES:
             raise SceneError(f"{place}: more than {MOST_INCLUDES} files are included; include fewer")
         found = self.files.path(name, path)
+        if found == path and Path(name).name != name:  # a file of the same name elsewhere, which is missing
+            found = self.files.scene.parent / name
         return self.directives(found, f"{found.name} ", depth)
 
     def _directive(self, token: Token, tokens: Tokens, path: Path) -> Directive:
@@ -157,10 +159,10 @@ def _parameters(tokens: Tokens) -> dict[str, Parameter]:
     found: dict[str, Parameter] = {}
     while (token := tokens.peek()) is not None and token.is_string:
         tokens.take("a parameter")
-        given, _, name = token.text.strip().partition(" ")
-        name = name.strip()
-        kind = TYPES.get(given.strip())
-        if kind is None or not name:
+        words = token.text.split(None, 1)
+        given, name = words[0] if words else "", words[-1].strip() if words else ""
+        kind = TYPES.get(given)
+        if kind is None or len(words) < 2:
             raise SceneError(
                 f'{tokens.place(token)}: "{token.text:.{SHOWN}}" is not a parameter; write a type, a space and a name, '
                 f'such as "float radius"; types are {", ".join(TYPES)}'

@@ -59,7 +59,7 @@ def _limit(points: Doubles, faces: Ints) -> Doubles:
     beta = np.where(valence == 3, 3 / 16, 3 / (8 * np.maximum(valence, 1)))
     gamma = (1 / (valence + 3 / (8 * beta)))[:, None]
     moved = (1 - valence[:, None] * gamma) * points + gamma * edges.summed(points, count)
-    return np.where(rim.flags[:, None], 0.6 * points + 0.2 * rim.neighbors, moved)
+    return np.where(rim.flags[:, None], (4 * points + rim.neighbors) / 6, moved)
 
 
 class _Rim:

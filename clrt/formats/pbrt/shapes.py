@@ -135,9 +135,7 @@ class ShapeReader:
 
     def _material(self, use: ShapeUse) -> Material | None:
         """Return the material of a shape with its medium and opacity; None if it has no surface."""
-        given = use.material
-        entity = self._description.material(given, use.shape) if isinstance(given, str) else given
-        material = None if entity is None else self._materials.material(entity)
+        material = self._own_material(use)
         for name in {use.outside, use.inside} - {""}:
             material = self._filled(material, name, use)
         if material is None:
@@ -160,6 +158,14 @@ class ShapeReader:
         elif alpha < 1:
             return replace(material, opacity=max(alpha, 0.0))
         return material
+
+    def _own_material(self, use: ShapeUse) -> Material | None:
+        given = use.material
+        if isinstance(given, str) and self._description.old and given not in self._description.materials:
+            self._notes.differ(use.shape, f'the material "{given}" is not defined; as in pbrt-v3 it is ignored')
+            return Diffuse(color=(0.5, 0.5, 0.5))
+        entity = self._description.material(given, use.shape) if isinstance(given, str) else given
+        return None if entity is None else self._materials.material(entity)
 
     def _filled(self, material: Material | None, name: str, use: ShapeUse) -> Material | None:
         """Return the material with a medium inside, which only glass may have, and only one that absorbs."""
