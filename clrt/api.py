@@ -42,7 +42,7 @@ def load(
     approximate: bool = False,
     parameters: Mapping[str, str] = {},
 ) -> Scene:
-    """Load a scene file (.toml, or Mitsuba's .xml) or a bare model (glTF, USD, OBJ, PLY, STL, OFF or 3MF).
+    """Load a scene file (.toml, Mitsuba's .xml, pbrt's .pbrt) or a bare model (glTF, USD, OBJ, PLY, STL, OFF or 3MF).
 
     camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left". For a
     bare model also up: which of its axes points up, "x", "y" or "z"; unit: that of its coordinates, "m", "cm", "mm",
@@ -54,8 +54,9 @@ def load(
     lux, "radiometric" for W/sr and W/m², "blender" for watts; by default as the file's generator and their brightness
     suggest. ignore_extensions: names of extensions that the file may require although clrt does not support them.
 
-    approximate: of a Mitsuba scene, what clrt lacks is replaced by something similar or left out, with a warning each,
-    instead of an error. parameters: of a Mitsuba scene, values of $NAME in it, which replace its defaults.
+    approximate: of a Mitsuba or pbrt scene, what clrt lacks is replaced by something similar or left out, with a
+    warning each, instead of an error. parameters: of a Mitsuba scene, values of $NAME in it, which replace its
+    defaults.
 
     Raises SceneError, which lists all problems.
     """

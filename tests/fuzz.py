@@ -50,6 +50,7 @@ FORMATS = (
     ".usdz",
     ".xml",
     ".serialized",
+    ".pbrt",
     *PICTURES,
 )
 GOOD = ("picture", "error")

@@ -128,6 +128,40 @@ MITSUBA_0 = """<scene version="0.6.0">
 <emitter type="point"><blackbody name="intensity" temperature="5000K" scale="1e-3"/>
 <transform name="toWorld"><translate x="1" y="2"/></transform></emitter></scene>
 """
+PBRT = """Film "rgb" "integer xresolution" 48 "integer yresolution" 32 "float iso" 200
+Sampler "zsobol" "integer pixelsamples" 16 Integrator "volpath" "integer maxdepth" 4
+LookAt 1 -7 3  0 0 1  0 0 1
+Camera "perspective" "float fov" 50 "float lensradius" .1
+WorldBegin
+LightSource "infinite" "string filename" "sky.hdr" "float scale" 2
+LightSource "spot" "blackbody I" 3000 "float power" 100 "point3 from" [1 2 3] "float coneangle" 40
+Texture "wood" "spectrum" "imagemap" "string filename" "wood.png" "float uscale" 2 "bool invert" true
+Texture "board" "spectrum" "checkerboard" "rgb tex1" [.8 .3 .2] "rgb tex2" [.1 .1 .1]
+Texture "mixed" "spectrum" "mix" "texture tex1" "wood" "rgb tex2" [1 1 1] "float amount" .3
+MakeNamedMaterial "plank" "string type" "coateddiffuse" "texture reflectance" "mixed" "float roughness" .1
+MakeNamedMedium "tea" "string type" "homogeneous" "rgb sigma_a" [1 2 4] "rgb sigma_s" [0 0 0]
+AttributeBegin Material "diffuse" "texture reflectance" "board"
+Shape "bilinearmesh" "point3 P" [-4 -4 0 4 -4 0 -4 4 0 4 4 0] AttributeEnd
+AttributeBegin NamedMaterial "plank" ConcatTransform [1 0 0 0 0 1 0 0 0 0 1 0 2 0 1 1] ReverseOrientation
+Shape "cylinder" "float phimax" 270 Shape "loopsubdiv" "integer levels" 1
+"point3 P" [0 0 0 1 0 0 0 1 0 0 0 1] "integer indices" [0 2 1 0 1 3 1 2 3 0 3 2] AttributeEnd
+ObjectBegin "group" Material "conductor" "spectrum eta" "metal-Au-eta" "spectrum k" [400 2 700 4]
+Shape "plymesh" "string filename" "b.ply" Shape "sphere" "float radius" .5 ObjectEnd
+AttributeBegin Rotate 70 1 0 0 ObjectInstance "group" AttributeEnd
+AttributeBegin MediumInterface "tea" "" Material "dielectric" "spectrum eta" "glass-BK7" Translate 0 0 2
+Shape "sphere" "float alpha" .5 AttributeEnd
+AreaLightSource "diffuse" "spectrum L" [400 1 700 3] "bool twosided" true
+Shape "disk" "float innerradius" .2
+"""
+PBRT_3 = """Film "image" "integer xresolution" [48] "float scale" [2]
+Camera "environment"
+WorldBegin
+LightSource "infinite" "rgb L" [1 1 1] "string mapname" "sky.exr"
+Material "uber" "color Kd" [.1 .2 .3] "rgb opacity" [.5 .5 .5] "float roughness" .2
+Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0] "float uv" [0 0 1 0 0 1]
+Include "part.pbrt"
+WorldEnd
+"""
 
 
 def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
@@ -167,6 +201,8 @@ def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
     (folder / "b.obj").write_text(OBJ.replace("damaged", "a"))
     (folder / "a.toml").write_text(SCENE)
     for name, text in {"a.xml": MITSUBA, "old.xml": MITSUBA_0}.items():
+        (folder / name).write_text(text)
+    for name, text in {"a.pbrt": PBRT, "old.pbrt": PBRT_3, "part.pbrt": 'Shape "sphere"\n'}.items():
         (folder / name).write_text(text)
     parts = [stream(TRIANGLE, np.array([[0, 1, 2]]), 4)] * 2
     (folder / "a.serialized").write_bytes(serialized(parts))

@@ -1,4 +1,4 @@
-"""`clrt convert`: a model or a Mitsuba scene to a scene file as a starting point."""
+"""`clrt convert`: a model, or a Mitsuba or pbrt scene, to a scene file as a starting point."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .option_groups import grouped
 def command(model: Path, scene: Path, loading: LoadOptions, force: bool) -> None:
     """Write SCENE.toml, which renders like `clrt render MODEL`, with its camera, sky, lights and materials to edit.
 
-    MODEL is a model, or a Mitsuba scene (.xml).
+    MODEL is a model, or a Mitsuba (.xml) or pbrt scene (.pbrt).
     """
     from ..formats.toml.writer import started
     from ..output.atomic_files import check_target

@@ -66,7 +66,8 @@ class LoadOptions:
         "--approximate",
         default=False,
         is_flag=True,
-        help="Replace what clrt lacks of a Mitsuba scene by something similar, or leave it out, with a warning each.",
+        help="Replace what clrt lacks of a Mitsuba or pbrt scene by something similar, or leave it out, with a warning "
+        "each.",
     )
 
     parameters: tuple[tuple[str, str], ...] = flag(

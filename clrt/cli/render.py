@@ -56,7 +56,7 @@ def command(
     **options: Any,
 ) -> None:
     """Render SCENE until the first of --spp, --time and --error is reached. SCENE is a .toml scene, a Mitsuba scene
-    (.xml), a model, or - for a .toml scene on standard input."""
+    (.xml), a pbrt scene (.pbrt), a model, or - for a .toml scene on standard input."""
     if click.get_current_context().obj == PROGRAM:
         guarded(saving.advice)
     end_by_signals()

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
+import numpy as np
+
 from ...errors import SceneError
 from ...scene.lights import Light
 from ...scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
@@ -116,9 +118,11 @@ class _Converter:
         return [each for each in lights if each], sky or Environment()
 
     def _tried(self, read: Callable[[], Part]) -> Part | None:
-        """Return what `read` returns; None if it raises SceneError, which is noted."""
+        """Return what `read` returns; None if it raises SceneError, which is noted. Values beyond float32 become Inf,
+        which `validate` rejects."""
         try:
-            return read()
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                return read()
         except SceneError as error:
             self._problems += [problem for problem in error.problems if problem not in self._problems]
             if isinstance(error, UnsupportedError):
