@@ -38,6 +38,7 @@ class Tokens:
         self._content = content
         self._prefix = prefix
         self._place = 0
+        self._next: Token | None = None
         self._counted, self._line = 0, 1
 
     def place(self, token: Token) -> str:
@@ -48,6 +49,11 @@ class Tokens:
 
     def peek(self) -> Token | None:
         """Return the next token; None at the end."""
+        if self._next is None:
+            self._next = self._read()
+        return self._next
+
+    def _read(self) -> Token | None:
         found = _BLANK.match(self._content, self._place)
         self._place = found.end() if found else self._place
         if self._place >= len(self._content):
@@ -61,14 +67,16 @@ class Tokens:
         text = (quoted if quoted is not None else bracket or word).decode("utf-8", "backslashreplace")
         if quoted is not None and "\\" in text:
             text = _ESCAPE.sub(lambda found: _ESCAPED.get(found[1], found[1]), text)
-        return Token(text, quoted is not None, self._place)
+        token = Token(text, quoted is not None, self._place)
+        self._place = match.end()
+        return token
 
     def take(self, wanted: str) -> Token:
         """Return the next token and move on. wanted: what it stands for, if the file ends."""
         token = self.peek()
         if token is None:
             raise SceneError(f"{self._prefix}ends where {wanted} should be; complete it")
-        self._place = _TOKEN.match(self._content, self._place).end()  # type: ignore[union-attr]
+        self._next = None
         return token
 
     def values(self, name: str) -> Values:
@@ -77,12 +85,10 @@ class Tokens:
         if token.text != "[" or token.is_string:
             return _parsed([token], f'{self.place(token)}: "{name}"')
         end = self._content.find(b"]", self._place)
-        inside = self._content[self._place : end] if end >= 0 else b""
-        if len(inside) >= LONG and b'"' not in inside and b"#" not in inside:
-            found = numbers_of(inside)
-            if not found.malformed and np.isfinite(found.values).all():
-                self._place = end + 1
-                return found.values
+        inside = self._content[self._place : end] if end >= 0 else b'"'
+        if b'"' not in inside and b"#" not in inside and (found := _plain(inside)) is not None:
+            self._place = end + 1
+            return found
         tokens: list[Token] = []
         while (token := self.take(f'the ] of "{name}"')).text != "]" or token.is_string:
             tokens.append(token)
@@ -105,6 +111,19 @@ class Tokens:
             place = self.place(first) if first else self._prefix
             raise SceneError(f"{place}: {name} has {len(values)} numbers; write {count}")
         return values
+
+
+def _plain(text: bytes) -> Doubles | None:
+    """Return the numbers of a text; None if there are other words."""
+    if len(text) >= LONG:
+        found = numbers_of(text)
+        values = found.values if not found.malformed else np.full(1, np.nan)
+    else:
+        try:
+            values = np.array([float(word) for word in text.split()], np.float64)
+        except ValueError:
+            return None
+    return values if np.isfinite(values).all() else None
 
 
 def _parsed(tokens: list[Token], where: str) -> Values:
