@@ -205,7 +205,7 @@ def test_a_model_shows_its_own_camera(tmp_path: Path) -> None:
         ("a.obj", "no such model file"),
         ("loop.toml", "no such scene file"),
         ("pipe.toml", "is a device, a pipe or a socket, not a scene"),
-        ("a.blend", "a scene must be one of .toml, .xml, .glb"),
+        ("a.blend", "a scene must be one of .toml, .xml, .pbrt"),
     ],
 )
 def test_files_that_are_no_scene(name: str, sentence: str, tmp_path: Path) -> None:
