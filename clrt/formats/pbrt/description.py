@@ -16,6 +16,8 @@ from .tokens import Doubles
 
 #: Maximum nesting depth of attributes.
 DEEPEST = 256
+#: Tolerance of the last row of a matrix.
+AFFINE = 1e-4
 #: What only files of v3 and before have, by directive.
 OLD = {
     "Film": {"image"},
@@ -141,9 +143,12 @@ class _Interpreter:
             self._found.moving = self._found.moving or each.place
         else:
             with np.errstate(all="ignore"):
-                self._state.to_world = self._transforms[each.name](each)
-            if not np.isfinite(self._state.to_world).all() or (self._state.to_world[3] != (0, 0, 0, 1)).any():
+                to_world = self._transforms[each.name](each)
+                self._state.to_world = to_world / to_world[3, 3]
+            last = np.abs(to_world[3] - (0, 0, 0, to_world[3, 3])).max()
+            if not np.isfinite(self._state.to_world).all() or last > AFFINE * abs(to_world[3, 3]):
                 raise SceneError(f"{each.place}: {each.name} is not affine or not finite; write an affine one")
+            self._state.to_world[3] = (0, 0, 0, 1)
 
     def _system(self, each: Directive) -> Doubles:
         name = each.words[0]
