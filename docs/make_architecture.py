@@ -32,7 +32,7 @@ ROWS: tuple[tuple[tuple[str, str, int, int], ...], ...] = (
     (("rendering", "compiles the scene, plans launches, sums samples, estimates the error, checkpoints", 350, 960),),
     (("queries", "rays from Python", 710, 838), ("trimesh", "its interface", 850, 960)),
     (("device", "drivers, programs, launches", 350, 650), ("accel", "builds and packs BVHs", 670, 960)),
-    (("scene", "dataclasses, validation", 350, 650), ("formats", "TOML, glTF, OBJ, Mitsuba, images", 670, 960)),
+    (("scene", "dataclasses, validation", 350, 650), ("formats", "TOML, glTF, USD, OBJ, Mitsuba, pbrt", 670, 960)),
 )
 #: Folders of kernels/ in the order in which a path segment passes them, from the bottom.
 KERNELS = (
