@@ -96,6 +96,7 @@ def fractions(cosines: Doubles, alpha: float, ior: float, distribution: Distribu
     cosine = cosines[:, None] * z + np.sqrt(1 - cosines**2)[:, None] * np.sqrt(1 - z**2) * np.cos(phi)
     seen = np.maximum(cosine, 0) / z * rest**2
     seen /= seen.sum(axis=1, keepdims=True)
+    cosine = np.maximum(cosine, GRAZING)  # facets that face away have no weight
     cos2 = 1 - (1 - cosine**2) / ior**2
     cos_t = np.sqrt(np.maximum(cos2, 0))
     across = (cosine - ior * cos_t) / (cosine + ior * cos_t)
