@@ -37,7 +37,8 @@ static inline Bounce anisotropic_bounce(const Anisotropy *a, real3 w) {
         float row_t = LANE(a->row.x, lane), row_b = LANE(a->row.y, lane);
         float8 cell = row_t > 0.0f ? anisotropy_entry(a->scene, number, row_t, row_b)
                                    : vload8(0, RECORD(a->scene->layer_entries, number)->part);
-        float4 upper = (float4)(cell.s01, cell.s45), lower = (float4)(cell.s23, cell.s67);
+        // One by one: Oclgrind's checks crash at shuffles of vectors of unequal length.
+        float4 upper = (float4)(cell.s0, cell.s1, cell.s4, cell.s5), lower = (float4)(cell.s2, cell.s3, cell.s6, cell.s7);
         float4 values = mix(upper, lower, LANE(t, lane) - step);
         float2 found = mix(values.s02, values.s13, LANE(u, lane) - azimuth);
         lost.lane[lane] = found.x;

@@ -115,6 +115,7 @@ def test_materials_are_told_by_what_they_reflect() -> None:
         "type": "dielectric",
         "int_ior": 1.3,
         "ext_ior": 1.0,
+        "specular_reflectance": {"type": "rgb", "value": [1.0, 1.0, 1.0]},
         "specular_transmittance": {"type": "rgb", "value": [0.9, 0.8, 0.7]},
     }, "not two-sided"
 
