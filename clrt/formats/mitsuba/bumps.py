@@ -94,7 +94,7 @@ def _median(values: Doubles, weights: Doubles) -> Doubles:
 
 def _by_texel(found: ImageSize, median: ImageSize, at: Doubles, heights: Texture) -> ImageSize | None:
     """Return the sizes of triangles, whose corners (n, 3, 2) are `at` places of the image, by the texels of the normal
-    map; the median where there is no triangle."""
+    map; outside of triangles the median."""
     rows, columns = np.array(heights.picture.texels.shape[:2]) * finer(heights)
     if len(at) > MOST_TRIANGLES:
         return None
