@@ -6,7 +6,7 @@ A surface without `twosided` is black from behind in Mitsuba; here it looks the 
 from __future__ import annotations
 
 from dataclasses import replace
-from math import exp, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ...errors import SceneError
 from ...scene.materials.material_types import Conductor, Dielectric, Diffuse, Material, Mirror
 from ...scene.materials.plastic import Distribution
 from ...scene.materials.textures import Texture
+from ..scene_parts.absorbing_glass import absorbing_glass
 from ..scene_parts.refractive_indices import DIELECTRICS, METALS, Triple
 from .bumps import Bump
 from .materials import WHITE, MaterialReader, ShapeMaterial
@@ -223,7 +224,4 @@ def absorbing(material: Material, medium: Plugin) -> Material | None:
     ):
         return None
     rates = [rate * medium.value("scale", float, 1.0) for rate in rgb(medium.color("sigma_t", 1.0))]
-    if not (most := max(rates)):
-        return material
-    red, green, blue = (exp(-rate / most) for rate in rates)
-    return replace(material, attenuation_color=(red, green, blue), attenuation_distance=1 / most)
+    return absorbing_glass(material, rates, medium.at)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from math import exp, pi
+from math import pi
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ...scene.geometry.transform import transform_mesh
 from ...scene.materials.material_types import Dielectric, Diffuse, Material
 from ...scene.materials.textures import Texture
 from ...scene.model import Instance, Mesh, Sphere
+from ..scene_parts.absorbing_glass import absorbing_glass
 from ..scene_parts.notes import Notes
 from ..scene_parts.spheres import inside_out, sphere_at
 from .description import Description, Placed, ShapeUse
@@ -189,10 +190,7 @@ class ShapeReader:
             return None
         medium.ignore(("g", "type", "Lescale"))
         rates = [rate * medium.number("scale", 1.0) for rate in spectra.unbounded(medium, "sigma_a", 1.0)]
-        if not (most := max(rates)) > 0:
-            return material
-        red, green, blue = (exp(-rate / most) for rate in rates)
-        return replace(material, attenuation_color=(red, green, blue), attenuation_distance=1 / most)
+        return absorbing_glass(material, rates, medium.at)
 
     def _lit(self, use: ShapeUse, material: Material, area: float) -> Material:
         """Return the material with the emission of a shape of this area."""
