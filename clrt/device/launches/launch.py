@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import NamedTuple
 
 import pyopencl as cl
 
@@ -40,15 +41,39 @@ LONGEST_LOOK = 0.1
 SOON = 2e-4
 
 
+class LaunchEvents(NamedTuple):
+    """Events of the first and the last kernel of a launch; the same if it has one."""
+
+    first: cl.Event
+    last: cl.Event
+
+    @property
+    def seconds(self) -> float:
+        """Return the run time of a finished launch by the device's clock, or 0 if it is not available.
+
+        With rusticl all launches take a nanosecond.
+        """
+        try:
+            nanoseconds = self.last.profile.end - self.first.profile.start
+        except cl.Error:
+            return 0.0
+        return 1e-9 * nanoseconds if nanoseconds > 1 else 0.0
+
+
+def run_seconds(event: cl.Event) -> float:
+    """Return the run time of a finished kernel, see `LaunchEvents`."""
+    return LaunchEvents(event, event).seconds
+
+
 class LaunchSize:
     """Adaptive size of the next launch: `units`, in the caller's units of work.
 
-    It follows the slowest recent launches, not their mean: the cost varies across an image, and other programs compete
+    It is at most `most`. It follows the slowest recent launches, not their mean: the cost varies across an image, and other programs compete
     for the device, so launches that take the target time on average would often take twice that.
     """
 
-    def __init__(self, first: int) -> None:
-        self.units = first
+    def __init__(self, first: int, most: int | None = None) -> None:
+        self.units, self._most = first, most
         self._unit_seconds = 0.0
 
     def learn(self, work: int, seconds: float) -> None:
@@ -58,29 +83,29 @@ class LaunchSize:
         took = seconds / work
         self._unit_seconds = max(took, REMEMBERED * self._unit_seconds + (1 - REMEMBERED) * took)
         wanted = TARGET_SECONDS / max(self._unit_seconds, 1e-15)
-        self.units = max(1, int(min(wanted, GROWTH * max(work, self.units))))
+        self.units = max(1, int(min(wanted, GROWTH * max(work, self.units), self._most or wanted)))
 
 
 class Launches:
     """Launches in flight on a queue, of adaptive size. longest: the longest launch so far, in seconds."""
 
-    def __init__(self, first_size: int) -> None:
-        self._size = LaunchSize(first_size)
-        self._running: deque[tuple[cl.Event, cl.Event, int]] = deque()
+    def __init__(self, first_size: int, most: int | None = None) -> None:
+        self._size = LaunchSize(first_size, most)
+        self._running: deque[tuple[LaunchEvents, cl.Event, int]] = deque()
         self._wait = Wait()
         self._last = self.longest = 0.0
 
-    def add(self, event: cl.Event, work: int) -> None:
+    def add(self, events: LaunchEvents, work: int) -> None:
         """Register a launch of `work` units that was just enqueued; wait while too many are in flight."""
-        self.begin(event, event, work)
+        self.begin(events, events.last, work)
         while self.full:
             self._finish_one()
 
-    def begin(self, event: cl.Event, last: cl.Event, work: int) -> None:
+    def begin(self, events: LaunchEvents, last: cl.Event, work: int) -> None:
         """Register a launch that was just enqueued, and the last event that belongs to it, without waiting."""
         if not self._running:
             self._last, self._wait = time.perf_counter(), Wait()
-        self._running.append((event, last, work))
+        self._running.append((events, last, work))
 
     @property
     def size(self) -> int:
@@ -110,26 +135,14 @@ class Launches:
             self._finish_one()
 
     def _finish_one(self) -> None:
-        event, last, work = self._running[0]
+        events, last, work = self._running[0]
         wait_for(last)
         self._running.popleft()
         now = time.perf_counter()
-        seconds = run_seconds(event) or now - self._last
+        seconds = events.seconds or now - self._last
         self._last, self._wait = now, Wait()
         self.longest = max(self.longest, seconds)
         self._size.learn(work, seconds)
-
-
-def run_seconds(event: cl.Event) -> float:
-    """Return the run time of a finished launch by the device's clock, or 0 if it is not available.
-
-    With rusticl all launches take a nanosecond.
-    """
-    try:
-        nanoseconds = event.profile.end - event.profile.start
-    except cl.Error:
-        return 0.0
-    return 1e-9 * nanoseconds if nanoseconds > 1 else 0.0
 
 
 def run_kernel(device: Device, kernel: cl.Kernel, groups: int) -> None:

@@ -56,7 +56,7 @@ class DeviceWorker:
         film_bytes = IN_FLIGHT * self.window_tiles * self._tile_bytes
         self.scene = SceneOnDevice(device, compiled, launch, film_bytes, windows=True, before=before)
         self._windows = self._make_windows()
-        self.launches = Launches(first_launch_samples(compiled))
+        self.launches = Launches(first_launch_samples(compiled), self.scene.most_work)
         self.at: deque[WorkerShare] = deque()
         self.samples = 0
 
@@ -97,11 +97,11 @@ class DeviceWorker:
         with calling():
             begin_copy(device, window.tiles, share.tiles)
             begin_copy(device, window.film, share.pixels)
-            event = self.scene.enqueue_pixels(window.film, window.tiles)
+            events = self.scene.enqueue_pixels(window.film, window.tiles)
             last = begin_copy(device, share.pixels, window.film)
             device.queue.flush()
         self.at.append(share)
-        self.launches.begin(event, last, pixels * part.more)
+        self.launches.begin(events, last, pixels * part.more)
 
     def ended(self) -> WorkerShare | None:
         """Return the oldest share in flight if it has ended, else None."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...accel.layouts import NO_RAYS
 from ...device.launches.device_arrays import DeviceArray, empty_array, resident
-from ...device.launches.launch import Launches
+from ...device.launches.launch import LaunchEvents, Launches
 from ...device.programs.program import build, make_kernel
 from ...errors import UsageError
 from ..film.tiles import TILE_PIXELS, row_by_row, scattered
@@ -47,7 +47,8 @@ def render_pixels(session: Accumulation, source: str, name: str, record: np.dtyp
         launch["first_pixel"], launch["pixel_count"] = done * TILE_PIXELS, count * TILE_PIXELS
         mark_pixels(device, window)
         kernel.set_args(*session.scene_arguments, window.buffer, tiles.buffer, launch[0])
-        launches.add(session.enqueue(kernel, count * TILE_PIXELS), count * work)
+        event = session.enqueue(kernel, count * TILE_PIXELS)
+        launches.add(LaunchEvents(event, event), count * work)
         launches.wait()
         found = DeviceArray(window.buffer, record, count * TILE_PIXELS).read(device)
         pixels[order[done : done + count]] = found.reshape(count, TILE_PIXELS)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...device.driver_errors import driver_errors
 from ...device.launches.device_arrays import lent, on_host, same_content
 from ...device.launches.hang_watchdog import warming_up
-from ...device.launches.launch import calling, wait_for
+from ...device.launches.launch import LaunchEvents, calling, wait_for
 from ...device.memory_plan import array_bytes, check_memory, part_count, part_records, parts, size
 from ...device.open import Device
 from ...device.programs.background_compile import in_background
@@ -22,8 +22,9 @@ from ...device.programs.program import BuiltProgram, build, make_kernel
 from ...errors import NoRoomError
 from ...scene.model import Camera
 from ..compile.camera_kernel import CAMERA_FIELDS, launch_record
-from ..compile.compile_scene import RASTER, CompiledScene
+from ..compile.compile_scene import QUEUES, RASTER, CompiledScene
 from .checked_loops import most_samples
+from .path_queues import PathQueues
 from .raster_bins import RasterBins
 
 #: Defined in programs whose film holds only the pixels of a launch.
@@ -61,6 +62,7 @@ class SceneOnDevice:
     ) -> None:
         self.device, self.compiled, self.launch, self.film_bytes = device, compiled, launch, film_bytes
         self._bins: RasterBins | None = None
+        self._queues: PathQueues | None = None
         self._check_memory()
         primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
         #: Maximum samples per pixel in one launch; None if unlimited.
@@ -81,6 +83,8 @@ class SceneOnDevice:
         self.scene_arguments = [*sum(self._buffers.values(), []), compiled.counts[0]]
         if compiled.entry == RASTER:
             self._bins = RasterBins(device, compiled, self.scene_arguments)
+        if compiled.entry == QUEUES:
+            self._queues = PathQueues(device, self.program, compiled, self.scene_arguments)
         self.build_seconds = 0.0 if self._warm else self.program.build_seconds
 
     def _uploaded(self, array: Any) -> list[cl.Buffer]:
@@ -98,7 +102,12 @@ class SceneOnDevice:
     @property
     def device_bytes(self) -> int:
         """Memory of all buffers on the device."""
-        return self.compiled.bytes + self.film_bytes + (self._bins.bytes if self._bins else 0)
+        return self.compiled.bytes + self.film_bytes + sum(own.bytes for own in (self._bins, self._queues) if own)
+
+    @property
+    def most_work(self) -> int | None:
+        """Maximum samples of all pixels in one launch; None if unlimited."""
+        return self._queues.capacity if self._queues else None
 
     @property
     def _needs(self) -> dict[str, int]:
@@ -144,14 +153,18 @@ class SceneOnDevice:
         start = time.perf_counter()
         self.launch["pixel_count"] = 0
         with warming_up():
-            wait_for(in_background(self.device.info.name, lambda: self.enqueue_pixels(film, tiles)))
+            wait_for(in_background(self.device.info.name, lambda: self.enqueue_pixels(film, tiles)).last)
         self.build_seconds += time.perf_counter() - start
 
-    def enqueue_pixels(self, film: cl.Buffer, tiles: cl.Buffer) -> cl.Event:
+    def enqueue_pixels(self, film: cl.Buffer, tiles: cl.Buffer) -> LaunchEvents:
         """Enqueue the integrator for the range in the launch record, of the image's tiles in `tiles`."""
+        if self._queues:
+            with self.allocating():
+                return self._queues.enqueue(film, tiles, self.launch)
         bins = self._bins.of(self.launch, self._needs) if self._bins else []
         self._kernel.set_args(*self.scene_arguments, film, tiles, self.launch[0], *bins)
-        return self.enqueue(self._kernel, int(self.launch["pixel_count"][0]), self.compiled.pixels)
+        event = self.enqueue(self._kernel, int(self.launch["pixel_count"][0]), self.compiled.pixels)
+        return LaunchEvents(event, event)
 
     def enqueue(self, kernel: cl.Kernel, pixel_count: int, share: int | None = None) -> cl.Event:
         """Enqueue a kernel of the scene, whose arguments are set, for `pixel_count` pixels.

@@ -10,7 +10,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from ...device.launches.device_arrays import on_device
-from ...device.launches.launch import Launches, calling, wait_for
+from ...device.launches.launch import LaunchEvents, Launches, calling, wait_for
 from ...device.launches.lent_memory import begin_copy
 from ...device.open import Device
 from ...errors import NoRoomError
@@ -53,7 +53,7 @@ class SingleDeviceAccumulation(LocalAccumulation):
             )
         self._scene = SceneOnDevice(device, compiled, plan.record(compiled), film_bytes, before=before)
         self._copies = HostMemory(size[::-1], compiled.choices.pixel)  # everything else has been allocated
-        self._launches = Launches(first_launch_samples(compiled))
+        self._launches = Launches(first_launch_samples(compiled), self._scene.most_work)
         with self._scene.allocating():
             self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))
             self._tiles = _Tiles(device, np.zeros(1, np.uint32))
@@ -82,13 +82,13 @@ class SingleDeviceAccumulation(LocalAccumulation):
             pixels = (share.end - share.first) * TILE_PIXELS
             self.launch["first_pixel"], self.launch["pixel_count"] = share.first * TILE_PIXELS, pixels
             self.launch["first_sample"], self.launch["sample_count"] = share.samples, share.more
-            event = self._launch()
+            events = self._launch()
             self.work.settle()  # before waiting, which Ctrl-C may interrupt
-            self._launches.add(event, pixels * share.more)
+            self._launches.add(events, pixels * share.more)
             yield
 
-    def _launch(self) -> cl.Event:
-        """Enqueue the kernel for the range in the launch record."""
+    def _launch(self) -> LaunchEvents:
+        """Enqueue the integrator for the range in the launch record."""
         if self._tiles.numbers is not self.work.tiles:
             self._tiles = _Tiles(self.device, self.work.tiles)
         return self._scene.enqueue_pixels(self._film, self._tiles.buffer)

@@ -15,12 +15,15 @@ if TYPE_CHECKING:
     from ...device.open import Device
 
 Lanes = Literal[1, 8, 16]
-#: "lanes" is the megakernel, one path per lane (kernels/integrator/path.cl); "waves" the wavefront, which advances many
-#: paths together by one vertex at a time (kernels/integrator/wavefront.cl).
-Paths = Literal["lanes", "waves"]
+#: "lanes" is the megakernel, one path per lane (kernels/integrator/path.cl). The others advance many paths together by
+#: one vertex at a time: "waves" those of a tile in one work-item (kernels/integrator/wavefront.cl), "queues" those of a
+#: launch, with a kernel per stage (kernels/integrator/queues.cl).
+Paths = Literal["lanes", "waves", "queues"]
 Offset = Literal["bound", "ulp", "fixed"]
 #: SIMD widths: paths per work-item; and the one that the wavefront needs.
 LANES, WAVE_LANES = get_args(Lanes), 8
+#: The SIMD width that an execution of paths needs.
+NEEDED_LANES = {"waves": WAVE_LANES, "queues": 1}
 #: Kernel files of the methods to offset ray origins from surfaces.
 OFFSETS = {name: f"offset/{name}.cl" for name in get_args(Offset)}
 
@@ -45,7 +48,8 @@ class Choices:
     direct_light: bool = False
     paths: str | None = option(
         None,
-        "lanes: megakernel; waves: wavefront with compaction (needs 8 lanes). Default: by device.",
+        "lanes: megakernel; waves: wavefront with compaction (needs 8 lanes); queues: a kernel per stage (needs 1 lane). "
+        "Default: by device.",
         get_args(Paths),
     )
     tree: bool | None = option(
@@ -60,8 +64,11 @@ class Choices:
 
     def __post_init__(self) -> None:
         check_values(self)
-        if self.paths == "waves" and self.lanes not in (None, WAVE_LANES):
-            raise UsageError(f"paths = waves needs {WAVE_LANES} lanes, not {self.lanes}; leave out one of them")
+        needed = NEEDED_LANES.get(self.paths or "")
+        if needed is not None and self.lanes not in (None, needed):
+            raise UsageError(
+                f"paths = {self.paths} needs {needed} lane{'s' * (needed > 1)}, not {self.lanes}; leave out one of them"
+            )
         if self.tree is not None and self.layout is not None and self.tree == (self.layout in TREELESS):
             raise UsageError(
                 f"the layout {self.layout} is {'not ' * self.tree}a BVH, and tree is "
@@ -80,7 +87,7 @@ class Choices:
 
         Raises UsageError if the device's SIMD width excludes the chosen paths.
         """
-        lanes = self.lanes or (device.lanes if device else WAVE_LANES)
+        lanes = self.lanes or (1 if self.paths == "queues" else device.lanes if device else WAVE_LANES)
         by_device: Paths = "waves" if lanes == WAVE_LANES and (device is None or device.packs) else "lanes"
         return ResolvedChoices(**{**vars(self), "lanes": lanes, "paths": self.paths or by_device})
 

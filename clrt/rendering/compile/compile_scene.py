@@ -26,10 +26,12 @@ from .geometry.pack_instances import ObjectIds
 from .pack_scene import pack_scene
 from .reuse_cache import ReuseCache
 
-MEGAKERNEL, WAVEFRONT, RASTER = "integrator/megakernel.cl", "integrator/wavefront.cl", "integrator/raster.cl"
-DEBUG = "integrator/debug.cl"
-#: Names of the kernels that trace paths, by file.
-KERNELS = {MEGAKERNEL: "megakernel", WAVEFRONT: "wavefront", RASTER: "raster", DEBUG: "debug"}
+MEGAKERNEL, WAVEFRONT, QUEUES = "integrator/megakernel.cl", "integrator/wavefront.cl", "integrator/queues.cl"
+RASTER, DEBUG = "integrator/raster.cl", "integrator/debug.cl"
+#: Names of the kernels that render, by file; the first of several.
+KERNELS = {MEGAKERNEL: "megakernel", WAVEFRONT: "wavefront", QUEUES: "generate", RASTER: "raster", DEBUG: "debug"}
+#: Files of path tracing by `Choices.paths`.
+PATHS = {"lanes": MEGAKERNEL, "waves": WAVEFRONT, "queues": QUEUES}
 
 
 @dataclass(frozen=True)
@@ -124,9 +126,7 @@ def compile_scene(
     features = features_of(packed, choices, device is not None and loop_turns(device) is not None)
     part_bytes = needed_parts((array for _, array in packed.buffers.values()), device.info) if device else None
     if entry is None:
-        integrator = scene.render.integrator
-        in_waves = integrator in WITH_LIGHT and choices.paths == "waves" and "LOOP_LIMIT" not in features
-        entry = RASTER if integrator == "raster" else WAVEFRONT if in_waves else MEGAKERNEL
+        entry = _entry(scene.render.integrator, choices, features)
     return CompiledScene(
         packed.buffers,
         packed.counts,
@@ -143,3 +143,11 @@ def compile_scene(
         part_bytes,
         (scene.render.clamp_direct or inf, scene.render.clamp_indirect or inf),
     )
+
+
+def _entry(integrator: str, choices: ResolvedChoices, features: set[str]) -> str:
+    """Return the kernel file of an integrator."""
+    if integrator == "raster":
+        return RASTER
+    entry = PATHS[choices.paths] if integrator in WITH_LIGHT else MEGAKERNEL
+    return MEGAKERNEL if entry == WAVEFRONT and "LOOP_LIMIT" in features else entry

@@ -1,0 +1,174 @@
+// Path tracing on GPUs by queues ("Megakernels Considered Harmful", Laine, Karras and Aila 2013): each stage is a kernel
+// over all paths of a launch, or over all shadow rays, and the paths that continue are compacted into the queue of the
+// next depth. So neighbouring work-items do the same work however paths end, and no kernel needs the registers of all
+// stages.
+//
+// Kernels of a launch, in order: generate; for each depth extend, shade and connect; update_film. Queue lengths stay on
+// the device. The film is that of the megakernel to the last bit, except that rays are counted per tile: a slot has its
+// own light, contributions to it are added in the order of the path, and update_film adds the samples of a pixel in
+// their order.
+#include "integrator/camera_rays.cl"
+#include "integrator/queue_records.cl"
+#include "film/film.cl"
+
+#define EACH_IN_QUEUE(i, count) for (uint i = get_global_id(0); i < (count); i += get_global_size(0))
+
+// The pixel of a slot; false if it is outside the image.
+static inline bool slot_pixel(const Launch *launch, global const uint *tiles, uint slot, LanePixels *pixel) {
+    return group_pixels(launch, tiles, slot % launch->pixel_count, pixel);
+}
+
+static inline Sampler slot_sampler(const Launch *launch, global const uint *tiles, uint slot, uint dimension) {
+    LanePixels pixel;
+    slot_pixel(launch, tiles, slot, &pixel);
+    Sampler sampler = sampler_at(pixel.code, launch->first_sample + slot / launch->pixel_count, launch->seed,
+                                 launch->block_bits);
+    sampler.dimension = dimension;
+    return sampler;
+}
+
+// Stage 1: generate camera rays.
+kernel void generate(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, const Launch launch) {
+    local uint group[2];
+    Scene scene = SCENE_ARGUMENTS;
+    const Queues q = QUEUE_ARGUMENTS;
+    Travel travel;
+    travel.slot = (uint)get_global_id(0);
+    LanePixels pixel;
+    bool seen = travel.slot < launch.pixel_count * launch.sample_count && slot_pixel(&launch, tiles, travel.slot, &pixel);
+    if (seen) {
+        clear_light(&q, travel.slot);
+        Sampler sampler = slot_sampler(&launch, tiles, travel.slot, 0);
+        CameraRay ray;
+        seen = camera_ray(&scene, &launch, pixel.x, pixel.y, next_2d(&sampler), &sampler, &ray);
+        travel.path = path_along(ray.origin, ray.direction);
+        travel.dimension = sampler.dimension;
+    }
+    uint place = reserve(queued_paths(&q, 1), seen, group);
+    if (seen) store_path(&q, 1, place, &travel);
+}
+
+// Stage 2: intersect the path segments with the scene.
+kernel void extend(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, const Launch launch, const int depth) {
+    Scene scene = SCENE_ARGUMENTS;
+    const Queues q = QUEUE_ARGUMENTS;
+    EACH_IN_QUEUE(i, *queued_paths(&q, depth)) {
+        global float4 *row = path_rows(&q, depth, i);
+        float4 origin = row[0], wi = row[q.capacity];
+#if OPACITY
+        Sampler sampler = slot_sampler(&launch, tiles, as_uint(origin.w), as_uint(wi.w));
+        Surface surface;
+        Hits hits = first_surface(&scene, xyz(origin), xyz(wi), depth == 1, true, &sampler, &surface);
+        row[q.capacity].w = as_float(sampler.dimension);
+#else
+        Hits hits = closest_hit(&scene, xyz(origin), xyz(wi), INFINITY, true);
+#endif
+        store_hits(&q, i, &hits);
+        check_loops(&q, i);
+    }
+}
+
+// What the stage `shade` makes of a path: its continuation and a shadow ray, if it has them.
+typedef struct {
+    Travel travel;
+    bool goes;
+#if SHADOWS
+    ShadowRay shadow;
+    bool sends;
+#endif
+} Shaded;
+
+#if PRIMITIVES
+// Add emission, sample a light (NEE) and sample the BSDF.
+static inline void shade_hit(const Scene *scene, const Queues *q, const Launch *launch, global const uint *tiles,
+                             int depth, const Hits *hits, Shaded *shaded) {
+    Path *path = &shaded->travel.path;
+    Surface surface = surface_at(scene, path->origin, path->wi, hits);
+    absorb(path, hits->t);
+    add_light(q, launch, shaded->travel.slot, emitted_light(scene, path, &surface, hits->t, true), depth);
+    if (depth >= launch->max_depth) return;
+#if DISPERSION
+    surface.throughput = path->beta;
+#endif
+    Shading shading = shading_at(scene, path->wi, &surface);
+    Sampler sampler = slot_sampler(launch, tiles, shaded->travel.slot, shaded->travel.dimension);
+#if SHADOWS
+    shaded->sends = aim_at_light(scene, path, &surface, &shading, true, &sampler, &shaded->shadow);
+#endif
+    shaded->goes = go_on(path, &surface, &shading, true, depth, launch->max_depth, &sampler);
+    shaded->travel.dimension = sampler.dimension;
+}
+#endif
+
+// Stage 3: add environment light for the paths that escape; shade the others.
+kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, const Launch launch, const int depth) {
+    local uint group[2];
+    Scene scene = SCENE_ARGUMENTS;
+    const Queues q = QUEUE_ARGUMENTS;
+    uint count = *queued_paths(&q, depth);
+    for (uint first = get_group_id(0) * get_local_size(0); first < count; first += get_global_size(0)) {
+        uint i = first + get_local_id(0);
+        Shaded shaded;
+        shaded.goes = false;
+#if SHADOWS
+        shaded.sends = false;
+#endif
+        if (i < count) {
+            Hits hits = load_hits(&q, i);
+            shaded.travel = load_path(&q, depth, i);
+            if (hits.primitive < 0) {
+                Path *path = &shaded.travel.path;
+                absorb(path, INFINITY);
+                add_light(&q, &launch, shaded.travel.slot, escaped_light(&scene, path, true), depth);
+            }
+#if PRIMITIVES
+            else shade_hit(&scene, &q, &launch, tiles, depth, &hits, &shaded);
+#endif
+        }
+#if SHADOWS
+        uint ray = reserve(queued_shadows(&q, depth), shaded.sends, group);
+        if (shaded.sends) store_shadow(&q, ray, &shaded.shadow, shaded.travel.slot);
+#endif
+        uint place = reserve(queued_paths(&q, depth + 1), shaded.goes, group);
+        if (shaded.goes) store_path(&q, depth + 1, place, &shaded.travel);
+    }
+}
+
+#if SHADOWS
+// Stage 4: trace the shadow rays and add the light of those that are unoccluded.
+kernel void connect(SCENE_PARAMETERS, QUEUE_PARAMETERS, const Launch launch, const int depth) {
+    Scene scene = SCENE_ARGUMENTS;
+    const Queues q = QUEUE_ARGUMENTS;
+    EACH_IN_QUEUE(i, *queued_shadows(&q, depth)) {
+        uint slot;
+        ShadowRay ray = load_shadow(&q, i, &slot);
+        add_light(&q, &launch, slot, light_along(&scene, &ray, true), depth + 1);
+        check_loops(&q, i);
+    }
+}
+#endif
+
+// Stage 5: add the samples of each pixel in order. The rays of the launch are counted in the first pixels of its tiles.
+kernel void update_film(QUEUE_PARAMETERS, global Pixel *film, global const uint *tiles, const Launch launch) {
+    const Queues q = QUEUE_ARGUMENTS;
+    LanePixels own;
+    if (!lane_pixels(&launch, tiles, &own) || q.lengths[0]) return;
+    Accumulator pixel = load_pixels(film, own.index);
+    uint first = (uint)get_global_id(0), tile = first / (TILE * TILE);
+    if (first % (TILE * TILE) == 0) {
+        uint rays = 0, tile_count = launch.pixel_count / (TILE * TILE);
+        for (int depth = 1; depth <= launch.max_depth; ++depth) rays += *queued_paths(&q, depth) + *queued_shadows(&q, depth);
+        pixel.rays += rays / tile_count + (tile < rays % tile_count);
+    }
+    for (uint s = 0; s < launch.sample_count; ++s) {
+        uint slot = s * launch.pixel_count + first;
+        ireal kept = accumulate(&pixel, slot_light(&q, slot, 0), true);
+#if DIRECT_LIGHT
+        accumulate_direct(&pixel, slot_light(&q, slot, DIRECT_ROW), kept);
+#endif
+#if CLAMP
+        pixel.clamped += kept ? q.light[slot + REMOVED_ROW * q.capacity] : ZERO;
+#endif
+    }
+    store_pixels(film, own.index, true, &pixel);
+}
