@@ -18,18 +18,20 @@ from clrt.device import contexts
 from clrt.device.launches import data_parallel
 from clrt.device.open import Device, open_device
 from clrt.device.programs import program
-from clrt.rendering.accumulation import scene_on_device
+from clrt.rendering.accumulation import path_queues, scene_on_device
 from clrt.scene.geometry import instancing
 
 from .small_work import work
 
 #: Execution settings by device type, which override those of the device.
 DEVICES: dict[str, dict[str, Any]] = {
-    "cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8", "packs": True},
-    "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh", "fuses": False},
+    "cpu": {"lanes": 8, "local_size": 1, "group_size": 1, "layout": "bvh8", "packs": True},
+    "gpu": {"lanes": 1, "local_size": 4, "group_size": 4, "layout": "cwbvh", "fuses": False},
 }
 #: Block sizes so small that even this work gives several work-items a block each.
 SHARES = {"SMALLEST_BLOCK": {"cpu": 4, "gpu": 4}, "SCAN_ITEMS": 4, "SCAN_PART": 256}
+#: So few work-items of the queues that each takes several entries.
+WORK_ITEMS = {"WORK_ITEMS": 16, "LATE_WORK_ITEMS": 8}
 ENQUEUE_COPY = cl.enqueue_copy
 
 
@@ -87,6 +89,7 @@ def main(form: str, path: str) -> None:
     for owner, values in (
         (Device, DEVICES[form]),
         (data_parallel, SHARES),
+        (path_queues, WORK_ITEMS),
         (cl, workarounds),
         (program, alone),
         (scene_on_device, alone),

@@ -118,15 +118,36 @@ def variants() -> Iterator[tuple[RenderSettings, dict[str, Any]]]:
             yield settings[i % 2], {"tests": HitTests(triangle, box, sphere), "offset": offset}
 
 
+def ball() -> Scene:
+    """Return a scene with one material type."""
+    alone = Scene(spheres=[Sphere()], environment=Environment(color=(1, 1, 1)), render=SETTINGS)
+    return replace(alone, lights=lamps(3).lights)
+
+
+def queued_pictures(device: Device) -> Iterator[tuple[str, Answers]]:
+    """Yield images that are rendered by queues, which need scalar kernels."""
+    if device.lanes > 1:
+        return
+    painting = replace(painted(scene()), render=SETTINGS)
+    subjects = {
+        "scene": scene(),
+        "ball": ball(),
+        "painted": dict(sights(painting))["lens"],
+        "planted": planted(painting),
+    }
+    for name, subject in subjects.items():
+        yield f"{name} queues", picture(device, subject, paths="queues", direct_light=name == "scene")
+
+
 def work(device: Device) -> Iterator[tuple[str, Answers]]:
     """Yield answers by subject and variant. All devices should give the same."""
     for layout in TREES:
         builder = "ploc" if layout in SHAPES else "sah"
         yield f"scene {layout}", picture(device, scene(), layout=layout, builder=builder)
+    yield from queued_pictures(device)
     for settings, chosen in variants():
         yield chosen["tests"].triangle, picture(device, replace(scene(), render=settings), **chosen)
-    ball = Scene(spheres=[Sphere()], environment=Environment(color=(1, 1, 1)), render=SETTINGS)
-    yield "ball", picture(device, replace(ball, lights=lamps(3).lights))
+    yield "ball", picture(device, ball())
     lit = replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)], render=SETTINGS)
     yield "lamps", picture(device, lit)
     painting = replace(painted(scene()), render=SETTINGS)

@@ -13,13 +13,18 @@ from .logs import verbose_option
 from .option_types import Finite
 
 if TYPE_CHECKING:
-    from ..device.device_info import DeviceInfo, Verdict
+    from ..bench.tuning.tune import Trial
+    from ..device.device_info import DeviceInfo, Tuning, Verdict
 
 
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON list.")
 @click.option("--check", is_flag=True, help="Check each device against known results, and store the outcome.")
-@click.option("--bench", is_flag=True, help="Measure each device's rays per second, and rank by it.")
+@click.option(
+    "--bench",
+    is_flag=True,
+    help="Measure each device's rays per second, rank by it, and find how it renders fastest.",
+)
 @click.option("--device", "selectors", multiple=True, metavar="SEL", help="Only this device; may be repeated.")
 @click.option(
     "--limit",
@@ -75,17 +80,33 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
 
 
 def _measured(info: DeviceInfo, limit: float) -> str:
-    """Measure a device's speed and store it; return an error message, or ""."""
+    """Measure a device's speed and how it renders fastest, and store both; return an error message, or ""."""
     from ..bench.rays.device_speed import measure_device
+    from ..bench.tuning.tune import tune
     from ..device.discovery.measured_speeds import keep_speed
+    from ..device.discovery.tunings import keep_tuning
+    from ..device.open import open_device
 
     click.echo(f"{info.name}: measuring", err=True)
     try:
         speed = measure_device(info, limit)
+        trial = tune(open_device(info.id), limit, lambda failure: click.echo(failure, err=True))
     except DeviceError as error:
         return str(error)
-    stored = keep_speed(info, speed)
+    click.echo("\n".join(_trial_lines(trial)), err=True)
+    stored = keep_speed(info, speed) and keep_tuning(info, trial.best)
     return "" if stored else f"{info.name}: its speed cannot be stored: the cache folder is not writable"
+
+
+def _trial_lines(trial: Trial) -> Iterator[str]:
+    """Return a line per candidate of a trial: its samples per second by scene; * marks the best."""
+    for tuning, seconds in trial.seconds.items():
+        rates = ", ".join(f"{name} {1e-6 / took:.3g}" for name, took in seconds.items())
+        yield f"{'*' if tuning == trial.best else ' '} {_told(tuning)}: {rates} Msamples/s"
+
+
+def _told(tuning: Tuning) -> str:
+    return f"paths {tuning.paths}, layout {tuning.layout}, work-groups of {tuning.group_size}"
 
 
 def _checked(info: DeviceInfo, limit: float, verdicts: dict[str, Verdict]) -> str:
@@ -117,6 +138,8 @@ def _lines(info: DeviceInfo) -> Iterator[str]:
             f"     Mrays/s: {info.bench.mrays_primary:.3g} primary, {info.bench.mrays_bounce:.3g} bounce, "
             f"{info.bench.mrays_shadow:.3g} shadow"
         )
+    if info.tuning:
+        yield f"     renders by {_told(info.tuning)}"
     if not info.usable:
         return
     if info.check is None:

@@ -25,7 +25,7 @@ from .progress_reporter import Progress
 from .render_options import OutputOptions, SavingOptions, StopOptions
 
 if TYPE_CHECKING:
-    from ..device.open import Device, Selectors
+    from ..device.open import Device
     from ..farm.cluster import Cluster
     from ..output.denoise import Denoiser
     from ..rendering.renderer import Renderer, State
@@ -109,7 +109,7 @@ class RenderJob:
 
     def run(self, cluster: Cluster | None, progress: Progress) -> bool:
         """Load the scene, render it and write the results; return False if interrupted."""
-        opening = None if cluster else beside(lambda: _open(self.options["device"]))
+        opening = None if cluster else beside(lambda: _open(self.options))
         content = self._load(progress)
         expected, goal = self._reference(content), self._goal(content)
         if cluster and self.sequence:
@@ -196,11 +196,14 @@ def _chosen_aovs(names: tuple[str, ...]) -> tuple[str, ...]:
     return chosen_aovs(",".join(names))
 
 
-def _open(selectors: Selectors) -> list[Device]:
+def _open(options: RendererOptions) -> list[Device]:
     """Open the devices and import what renders: half of this is file access, and it needs no scene."""
     from ..device.open import open_devices
+    from .first_use import tuned
 
-    devices = open_devices(selectors)
+    devices = open_devices(options["device"])
+    if options.get("paths") is None and options.get("layout") is None:
+        devices = tuned(devices)
     from ..rendering import renderer  # noqa: F401
 
     return devices

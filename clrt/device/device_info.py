@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
+from typing import Literal
 
 #: Layers that translate OpenCL to another API: part of the platform's or device's name, and the API.
 TRANSLATIONS = {"clvk": "Vulkan", "zink": "Vulkan", "openclon12": "Direct3D 12"}
@@ -39,13 +40,30 @@ class Speed:
         return 3 / (1 / self.mrays_primary + 1 / self.mrays_bounce + 1 / self.mrays_shadow)
 
 
+#: Executions of paths. "lanes" is the megakernel, one path per lane (kernels/integrator/path.cl). The others advance
+#: many paths together by one vertex at a time: "waves" those of a tile in one work-item
+#: (kernels/integrator/wavefront.cl), "queues" those of a launch, with a kernel per stage (kernels/integrator/queues.cl).
+Paths = Literal["lanes", "waves", "queues"]
+#: BVH layouts that a device may be tuned to.
+TunedLayout = Literal["bvh8", "bvh2", "cwbvh"]
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """How a device renders fastest, of what was tried. group_size: work-items per work-group of the queues' kernels."""
+
+    paths: Paths
+    layout: TunedLayout
+    group_size: int
+
+
 @dataclass(frozen=True)
 class DeviceInfo:
     """One OpenCL device, or a driver without devices (`usable` is then False and `why` the reason).
 
     id: stable until the platform or driver changes. why: a remark, or the reason why it cannot be used and the remedy.
-    check, bench: the result of its last check and its measured speed; None if it was not checked or measured in its
-    present state. hardware: its UUID and PCI address if its driver reports them.
+    check, bench, tuning: the result of its last check, its measured speed, and how it renders fastest; None if that is
+    not known in its present state. hardware: its UUID and PCI address if its driver reports them.
     """
 
     index: int
@@ -63,6 +81,7 @@ class DeviceInfo:
     chosen: bool
     check: Verdict | None = None
     bench: Speed | None = None
+    tuning: Tuning | None = None
     hardware: tuple[str, ...] = ()
 
     @property

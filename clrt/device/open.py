@@ -75,8 +75,19 @@ class Device:
         return 1 if self.vectors else 64
 
     @property
+    def group_size(self) -> int:
+        """Return the work-group size of the queues' kernels (rendering/accumulation/path_queues.py): the measured one,
+        else 128, which is up to a tenth faster than 64 and than 256 on an NVIDIA H200 (docs/measurements/gpus.md)."""
+        if self.vectors:
+            return 1
+        return self.info.tuning.group_size if self.info.tuning else 128
+
+    @property
     def layout(self) -> str:
-        """Return the BVH layout: "bvh8" (eight boxes per SIMD test) with explicit vectors, else "cwbvh"."""
+        """Return the BVH layout: the measured one; else "bvh8" (eight boxes per SIMD test) with explicit vectors, and
+        "cwbvh" without."""
+        if self.info.tuning:
+            return self.info.tuning.layout
         return "bvh8" if self.vectors else "cwbvh"
 
 

@@ -7,12 +7,13 @@ from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 from ..accel.methods import BoxTest, BuilderName, HitTests, LayoutName, SphereTest, TriangleTest
+from ..device.device_info import Paths
 from ..device.open import Selectors
 from ..file_names import StrPath
 from ..scene.render_settings import Culling, Filter, Integrator, RenderSettings, Sampler
 from .aovs import chosen_aovs, needs_direct_light, seen_first
 from .checkpoint.policy import CheckpointPolicy
-from .compile.choices import Choices, Lanes, Offset, Paths
+from .compile.choices import Choices, Lanes, Offset
 
 if TYPE_CHECKING:
     from .renderer import Renderer

@@ -3,7 +3,8 @@
 //
 // QUEUE_PARAMETERS, QUEUE_ARGUMENTS   the queues as a kernel's parameters, and as a Queues
 //
-// lengths: for each depth from 1 on, the number of paths and of shadow rays; entry 0 is set if the driver ended loops.
+// lengths: for each depth from 1 on, the number of paths and of shadow rays and, if SORT_HITS, of hits of each kind. Of
+// depth 0 only the first is used: it is set if the driver ended loops.
 #include "integrator/path_segment.cl"
 
 #define SHADOWS (PRIMITIVES && LIGHTS)
@@ -12,33 +13,46 @@
 #else
 #define PATH_ROWS 5
 #endif
+#if SORT_HITS
+#define ADD_ONE(name, number) + 1
+#define KINDS (1 MATERIAL_TYPES(ADD_ONE))   // misses, and hits by material type
+#else
+#define KINDS 0
+#endif
 
 typedef struct {
     global uint *lengths;
     global float4 *paths, *hits, *shadows;
     global int *instances;
+    global uint *order;  // by kind: the places of its hits
     global float *light;
     uint capacity;       // of each queue
 } Queues;
 
 #define QUEUE_PARAMETERS global uint *queue_lengths, global float4 *path_queue, global float4 *hit_queue, \
-                         global int *instance_queue, global float4 *shadow_queue, global float *light_of_slots, \
-                         const uint capacity
-#define QUEUE_ARGUMENTS {queue_lengths, path_queue, hit_queue, shadow_queue, instance_queue, light_of_slots, capacity}
+                         global int *instance_queue, global uint *hit_order, global float4 *shadow_queue, \
+                         global float *light_of_slots, const uint capacity
+#define QUEUE_ARGUMENTS {queue_lengths, path_queue, hit_queue, shadow_queue, instance_queue, hit_order, light_of_slots, capacity}
 
-static inline global uint *queued_paths(const Queues *q, int depth) { return q->lengths + 2 * depth; }
-static inline global uint *queued_shadows(const Queues *q, int depth) { return q->lengths + 2 * depth + 1; }
+static inline global uint *queued_paths(const Queues *q, int depth) { return q->lengths + (2 + KINDS) * depth; }
+static inline global uint *queued_shadows(const Queues *q, int depth) { return queued_paths(q, depth) + 1; }
+static inline global uint *queued_hits(const Queues *q, int depth) { return queued_paths(q, depth) + 2; }
 
-// Reserve a place in a queue for every work-item that `appends`, with one atomic operation per work-group. All
-// work-items of the group must call it. group: two words of local memory.
-static inline uint reserve(global uint *count, bool appends, local uint *group) {
-    if (get_local_id(0) == 0) group[0] = 0;
+// Reserve a place for every work-item in the queue of its kind, of `kinds` queues; none if kind >= kinds. One atomic
+// operation per work-group and queue; all work-items of the group must call it. group: 2 · kinds words of local memory.
+static inline uint reserve(global uint *lengths, uint kinds, uint kind, local uint *group) {
+    local uint *firsts = group + kinds;
+    for (uint k = get_local_id(0); k < kinds; k += get_local_size(0)) group[k] = 0;
     barrier(CLK_LOCAL_MEM_FENCE);
-    uint place = appends ? atomic_inc(&group[0]) : 0;
+    uint place = kind < kinds ? atomic_inc(&group[kind]) : 0;
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (get_local_id(0) == 0) group[1] = atomic_add(count, group[0]);
+    for (uint k = get_local_id(0); k < kinds; k += get_local_size(0)) firsts[k] = atomic_add(&lengths[k], group[k]);
     barrier(CLK_LOCAL_MEM_FENCE);
-    return group[1] + place;
+    return kind < kinds ? firsts[kind] + place : 0;
+}
+
+static inline uint reserve_if(bool appends, global uint *length, local uint *group) {
+    return reserve(length, 1, appends ? 0 : 1, group);
 }
 
 // A path between stages. Paths of even and odd depths have their own rows.

@@ -3,7 +3,8 @@
 // next depth. So neighbouring work-items do the same work however paths end, and no kernel needs the registers of all
 // stages.
 //
-// Kernels of a launch, in order: generate; for each depth extend, shade and connect; update_film. Queue lengths stay on
+// Kernels of a launch, in order: generate; for each depth extend, sort_hits, shade and connect;
+// update_film. Queue lengths stay on
 // the device. The film is that of the megakernel to the last bit, except that rays are counted per tile: a slot has its
 // own light, contributions to it are added in the order of the path, and update_film adds the samples of a pixel in
 // their order.
@@ -44,7 +45,7 @@ kernel void generate(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tile
         travel.path = path_along(ray.origin, ray.direction);
         travel.dimension = sampler.dimension;
     }
-    uint place = reserve(queued_paths(&q, 1), seen, group);
+    uint place = reserve_if(seen, queued_paths(&q, 1), group);
     if (seen) store_path(&q, 1, place, &travel);
 }
 
@@ -100,20 +101,23 @@ static inline void shade_hit(const Scene *scene, const Queues *q, const Launch *
 }
 #endif
 
-// Stage 3: add environment light for the paths that escape; shade the others.
+#include HIT_ORDER
+
+// Stage 4: add environment light for the paths that escape; shade the others.
 kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, const Launch launch, const int depth) {
     local uint group[2];
     Scene scene = SCENE_ARGUMENTS;
     const Queues q = QUEUE_ARGUMENTS;
-    uint count = *queued_paths(&q, depth);
-    for (uint first = get_group_id(0) * get_local_size(0); first < count; first += get_global_size(0)) {
-        uint i = first + get_local_id(0);
+    uint blocks = block_count(&q, depth);
+    for (uint block = get_group_id(0); block < blocks; block += get_num_groups(0)) {
+        uint i;
+        bool used = entry_of(&q, depth, block, &i);
         Shaded shaded;
         shaded.goes = false;
 #if SHADOWS
         shaded.sends = false;
 #endif
-        if (i < count) {
+        if (used) {
             Hits hits = load_hits(&q, i);
             shaded.travel = load_path(&q, depth, i);
             if (hits.primitive < 0) {
@@ -126,16 +130,16 @@ kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, 
 #endif
         }
 #if SHADOWS
-        uint ray = reserve(queued_shadows(&q, depth), shaded.sends, group);
+        uint ray = reserve_if(shaded.sends, queued_shadows(&q, depth), group);
         if (shaded.sends) store_shadow(&q, ray, &shaded.shadow, shaded.travel.slot);
 #endif
-        uint place = reserve(queued_paths(&q, depth + 1), shaded.goes, group);
+        uint place = reserve_if(shaded.goes, queued_paths(&q, depth + 1), group);
         if (shaded.goes) store_path(&q, depth + 1, place, &shaded.travel);
     }
 }
 
 #if SHADOWS
-// Stage 4: trace the shadow rays and add the light of those that are unoccluded.
+// Stage 5: trace the shadow rays and add the light of those that are unoccluded.
 kernel void connect(SCENE_PARAMETERS, QUEUE_PARAMETERS, const Launch launch, const int depth) {
     Scene scene = SCENE_ARGUMENTS;
     const Queues q = QUEUE_ARGUMENTS;
@@ -148,7 +152,7 @@ kernel void connect(SCENE_PARAMETERS, QUEUE_PARAMETERS, const Launch launch, con
 }
 #endif
 
-// Stage 5: add the samples of each pixel in order. The rays of the launch are counted in the first pixels of its tiles.
+// Stage 6: add the samples of each pixel in order. The rays of the launch are counted in the first pixels of its tiles.
 kernel void update_film(QUEUE_PARAMETERS, global Pixel *film, global const uint *tiles, const Launch launch) {
     const Queues q = QUEUE_ARGUMENTS;
     LanePixels own;

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from clrt.device.device_info import DeviceInfo, Speed
-from clrt.device.discovery import measured_speeds
+from clrt.device.discovery import kept_results
 from clrt.device.discovery.discover import find_devices
 from clrt.device.discovery.measured_speeds import keep_speed, kept_speed
 
@@ -30,7 +30,7 @@ def test_a_speed_comes_back(info: DeviceInfo, monkeypatch: pytest.MonkeyPatch) -
     assert kept_speed(info) is None and keep_speed(info, SPEED)
     assert kept_speed(info) == SPEED and SPEED.mrays == pytest.approx(15)
     assert kept_speed(replace(info, driver="2")) is None
-    monkeypatch.setattr(measured_speeds, "kernel_digest", lambda: "another")
+    monkeypatch.setattr(kept_results, "kernel_digest", lambda: "another")
     assert kept_speed(info) is None
 
 
@@ -41,7 +41,7 @@ def test_whatever_the_file_holds(info: DeviceInfo, tmp_path: Path, bench: object
     (file,) = tmp_path.glob("*.bench.json")
     kept = json.loads(file.read_bytes())
     one = isinstance(bench, float | str)
-    file.write_text(json.dumps(kept | {"bench": kept["bench"] | {"mrays_bounce": bench} if one else bench}))
+    file.write_text(json.dumps(kept | {"result": kept["result"] | {"mrays_bounce": bench} if one else bench}))
     assert kept_speed(info) is None
     file.write_bytes(b"\xff[")
     assert kept_speed(info) is None

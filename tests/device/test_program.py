@@ -24,6 +24,7 @@ from clrt.bench.numerics.bsdf_cases import variants
 from clrt.check import kernel_calls
 from clrt.debug.record import vertex_preamble
 from clrt.device import cache_files
+from clrt.device.device_info import Paths
 from clrt.device.launches.driver_loop_limits import turns_source
 from clrt.device.open import Device
 from clrt.device.programs.program import BuiltProgram, build, compose, files_of, make_kernel
@@ -34,7 +35,7 @@ from clrt.rendering.compile.choices import OFFSETS, Choices
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.geometry import instancing
 from clrt.scene.materials.material_types import MATERIALS
-from clrt.scene.model import Environment
+from clrt.scene.model import Environment, Scene, Sphere
 from clrt.scene.render_settings import Filter, Sampler
 
 from ..covering import others
@@ -129,7 +130,9 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
                 scene.environment = environment
                 used |= set(compile_scene(scene, choices).files)
     used |= set(compile_scene(everything(), Choices(layout="packs")).files)
-    used |= set(compile_scene(everything(), Choices(paths="lanes")).files)
+    for paths in get_args(Paths):
+        used |= set(compile_scene(everything(), Choices(paths=paths)).files)
+    used |= set(compile_scene(Scene(spheres=[Sphere()]), Choices(paths="queues")).files)  # one material type
     for sampler, name in zip(get_args(Sampler), get_args(Filter)):
         scene = everything()
         scene.render = replace(scene.render, sampler=sampler, filter=name)

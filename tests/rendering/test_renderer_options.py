@@ -6,13 +6,14 @@ import inspect
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
-from types import NoneType
+from types import NoneType, SimpleNamespace
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import pytest
 
 import clrt
 from clrt.accel.methods import HitTests
+from clrt.device.device_info import Paths, Tuning
 from clrt.device.open import Device
 from clrt.errors import UsageError
 from clrt.rendering.checkpoint.policy import CheckpointPolicy
@@ -92,20 +93,28 @@ def test_misspelled_keywords_are_refused(name: str, wrong: str, meant: str) -> N
 
 
 def test_choices_suit_the_device() -> None:
-    """What is chosen stays; the rest is the device's. Wavefront paths need 8 lanes that share packets."""
+    """What is chosen stays; the rest is the device's: what its trial found, else what suits its type. Waves need 8
+    lanes that are packed by one instruction, queues 1."""
 
     class Fake:
-        def __init__(self, lanes: int, packs: bool) -> None:
+        def __init__(self, lanes: int, packs: bool, kind: str = "cpu", measured: Paths | None = None) -> None:
             self.lanes, self.packs = lanes, packs
+            tuning = Tuning(measured, "cwbvh", 64) if measured else None
+            self.info = SimpleNamespace(type=kind, tuning=tuning)
 
-    def on(width: int, packs: bool, **chosen: Any) -> tuple[int, str]:
-        found = Choices(**chosen).on(Fake(width, packs))  # type: ignore[arg-type]
+    def on(*of_device: Any, **chosen: Any) -> tuple[int, str]:
+        found = Choices(**chosen).on(Fake(*of_device))  # type: ignore[arg-type]
         assert found.on(Fake(16, False)) == found  # type: ignore[arg-type]
         return found.lanes, found.paths
 
     assert on(8, True) == (8, "waves") and on(8, False) == (8, "lanes") and on(1, True) == (1, "lanes")
     assert on(1, True, lanes=8) == (8, "waves") and on(8, True, lanes=16) == (16, "lanes")
     assert on(8, False, paths="waves") == (8, "waves") and on(8, True, paths="lanes") == (8, "lanes")
+    assert on(1, False, "gpu") == (1, "queues") and on(1, False, "gpu", paths="lanes") == (1, "lanes")
+    assert on(8, True, paths="queues") == (1, "queues")
+    assert on(1, False, "gpu", "lanes") == (1, "lanes") and on(8, True, "cpu", "lanes") == (8, "lanes")
+    assert on(8, False, "cpu", "waves") == (8, "waves") and on(1, False, "cpu", "queues") == (1, "queues")
+    assert on(1, False, "gpu", "waves") == (1, "queues") and on(8, True, "cpu", "queues") == (8, "waves")
     with pytest.raises(UsageError, match="paths = waves needs 8 lanes, not 1"):
         on(1, True, paths="waves")
 

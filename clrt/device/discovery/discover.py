@@ -23,6 +23,7 @@ from .install_advice import no_device
 from .loader import devices_of
 from .measured_speeds import kept_speed
 from .platforms import load_platforms
+from .tunings import kept_tuning
 from .user_preference import Preference, preferred_device
 
 log = logging.getLogger(__name__)
@@ -58,8 +59,9 @@ def devices() -> list[dict[str, Any]]:
 
 
 def as_dict(info: DeviceInfo) -> dict[str, Any]:
-    """Return the fields of a device; `check`, `bench` and `hardware` only if they are known."""
-    return {name: value for name, value in asdict(info).items() if value or name not in ("check", "bench", "hardware")}
+    """Return the fields of a device; `check`, `bench`, `tuning` and `hardware` only if they are known."""
+    known = ("check", "bench", "tuning", "hardware")
+    return {name: value for name, value in asdict(info).items() if value or name not in known}
 
 
 def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
@@ -120,7 +122,8 @@ def _everything(again: bool) -> Found:
         here: Found = [(describe(device), device) for device in devices_of(platform)]
         for info, device in here or [(describe_empty(platform), None)]:
             own = with_own_id(info, {other.id for other, _ in found})
-            found.append((replace(own, check=kept_verdict(own), bench=kept_speed(own)), device))
+            kept = replace(own, check=kept_verdict(own), bench=kept_speed(own), tuning=kept_tuning(own))
+            found.append((kept, device))
     return found + [(describe_faulty(driver, fault), None) for driver, fault in faults.items()]
 
 

@@ -68,8 +68,8 @@ def run_seconds(event: cl.Event) -> float:
 class LaunchSize:
     """Adaptive size of the next launch: `units`, in the caller's units of work.
 
-    It is at most `most`. It follows the slowest recent launches, not their mean: the cost varies across an image, and other programs compete
-    for the device, so launches that take the target time on average would often take twice that.
+    It is at most `most`. It follows the slowest recent launches, not their mean: the cost varies across an image, and
+    other programs compete for the device, so launches that take the target time on average would often take twice that.
     """
 
     def __init__(self, first: int, most: int | None = None) -> None:

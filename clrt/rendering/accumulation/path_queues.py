@@ -15,11 +15,12 @@ from ...device.programs.program import BuiltProgram, make_kernel
 from ..compile.compile_scene import CompiledScene
 
 #: Samples whose paths are in the queues together: a large GPU is still busy when most of them have ended.
-MOST_SLOTS, FEWEST_SLOTS = 1 << 22, 1 << 10
+MOST_SLOTS, FEWEST_SLOTS = 1 << 23, 1 << 10
 #: Maximum fraction of the device's memory for the queues, as a divisor.
 SHARE = 4
-#: Maximum work-items of a stage per compute unit; each takes every n-th entry of its queue.
-WORK_ITEMS = 1 << 14
+#: Maximum work-items of a stage per compute unit; each takes every n-th entry of its queue. Fewer from the depth LATE
+#: on, where queues are shorter and an empty launch should cost little.
+WORK_ITEMS, LATE_WORK_ITEMS, LATE = 1 << 14, 1 << 11, 5
 #: Bytes of a row and of a word, and their number per slot (kernels/integrator/queue_records.cl).
 ROW, WORD = 16, 4
 PATH_ROWS, SHADOW_ROWS, LIGHT_WORDS = 5, 4, 3
@@ -27,14 +28,22 @@ PATH_ROWS, SHADOW_ROWS, LIGHT_WORDS = 5, 4, 3
 
 def slot_bytes(compiled: CompiledScene) -> dict[str, int]:
     """Return the bytes of a slot in each buffer, in the order of QUEUE_PARAMETERS."""
-    has = {name: name in compiled.features for name in ("ATTENUATION", "INSTANCES", "LIGHTS", "DIRECT_LIGHT", "CLAMP")}
+    names = "ATTENUATION", "INSTANCES", "LIGHTS", "DIRECT_LIGHT", "CLAMP"
+    has = {name: name in compiled.features for name in names}
     return {
         "paths": 2 * (PATH_ROWS + has["ATTENUATION"]) * ROW,
         "hits": ROW,
         "instances": has["INSTANCES"] * WORD,
+        "order": kind_count(compiled) * WORD,
         "shadows": has["LIGHTS"] * SHADOW_ROWS * ROW,
         "light": (LIGHT_WORDS * (1 + has["DIRECT_LIGHT"]) + has["CLAMP"]) * WORD,
     }
+
+
+def kind_count(compiled: CompiledScene) -> int:
+    """Return the number of kinds by which hits are sorted (kernels/integrator/queue_sorted.cl), 0 if they are not."""
+    types = sum(feature.startswith("MATERIAL_") for feature in compiled.features)
+    return 1 + types if "SORT_HITS" in compiled.features else 0
 
 
 class PathQueues:
@@ -49,9 +58,13 @@ class PathQueues:
         self._device, self._scene = device, scene_arguments
         self._slot_bytes = slot_bytes(compiled)
         self.capacity = _capacity(device, self._slot_bytes)
-        stages = ["extend", "shade"] + ["connect"] * (self._slot_bytes["shadows"] > 0 and "PRIMITIVES" in compiled.features)
-        self._kernels = {name: make_kernel(device, program, name) for name in ("generate", *stages, "update_film")}
-        self._stages = stages
+        self._kinds = kind_count(compiled)
+        shadows = {"PRIMITIVES", "LIGHTS"} <= set(compiled.features)
+        self._stages = ["extend", *["sort_hits"] * (self._kinds > 0), "shade", *["connect"] * shadows]
+        self._kernels = {
+            name: make_kernel(device, program, name) for name in ("generate", *self._stages, "update_film")
+        }
+        self._group = min(device.group_size, *map(self._largest_group, self._kernels.values()))
         self._slots = 0
         self._held: list[cl.Buffer] = []
         self._lengths: list[cl.Buffer] = []
@@ -71,14 +84,15 @@ class PathQueues:
         with calling():
             cl.enqueue_copy(self._device.queue, lengths, zeros, byte_count=lengths.size)
             first = self._run("generate", slots, *self._scene, *queues, tiles, launch[0])
+            picture = {"sort_hits": (), "connect": (launch[0],)}
             for name in self._stages:
-                picture: tuple[Any, ...] = () if name == "connect" else (tiles,)
-                self._kernels[name].set_args(*self._scene, *queues, *picture, launch[0], np.int32(0))
+                self._kernels[name].set_args(*self._scene, *queues, *picture.get(name, (tiles, launch[0])), np.int32(0))
             for depth in range(1, (depths if slots else 1) + 1):
+                most = (WORK_ITEMS if depth < LATE else LATE_WORK_ITEMS) * self._device.info.compute_units
                 for name in self._stages:
                     kernel = self._kernels[name]
                     kernel.set_arg(kernel.num_args - 1, np.int32(depth))
-                    self._launch(kernel, min(slots, WORK_ITEMS * self._device.info.compute_units))
+                    self._launch(kernel, min(slots, most))
             last = self._run("update_film", pixels, *queues, film, tiles, launch[0])
             self._device.queue.flush()
         return LaunchEvents(first, last)
@@ -88,14 +102,16 @@ class PathQueues:
         return self._launch(self._kernels[name], count)
 
     def _launch(self, kernel: cl.Kernel, count: int) -> cl.Event:
-        local = self._device.local_size
-        groups = max(1, -(-count // local))
-        return cl.enqueue_nd_range_kernel(self._device.queue, kernel, (groups * local,), (local,))
+        groups = max(1, -(-count // self._group))
+        return cl.enqueue_nd_range_kernel(self._device.queue, kernel, (groups * self._group,), (self._group,))
+
+    def _largest_group(self, kernel: cl.Kernel) -> int:
+        return int(kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self._device.cl))
 
     def _reserve(self, slots: int, depths: int) -> None:
         """Allocate buffers for this many slots and depths, unless there are."""
         context, flags = self._device.context, cl.mem_flags.READ_WRITE
-        needed = 2 * (depths + 2) * WORD
+        needed = (2 + self._kinds) * (depths + 2) * WORD
         with calling():
             if not self._lengths or self._lengths[0].size < needed:
                 zeros = cl.Buffer(context, flags, needed)
@@ -112,5 +128,7 @@ class PathQueues:
 def _capacity(device: Device, slot_bytes: dict[str, int]) -> int:
     """Return how many slots the device has room for: a power of two."""
     info = device.info
-    most = min(info.global_bytes // (SHARE * sum(slot_bytes.values())), info.max_alloc_bytes // max(slot_bytes.values()))
+    most = min(
+        info.global_bytes // (SHARE * sum(slot_bytes.values())), info.max_alloc_bytes // max(slot_bytes.values())
+    )
     return max(FEWEST_SLOTS, min(MOST_SLOTS, 1 << (max(1, most).bit_length() - 1)))

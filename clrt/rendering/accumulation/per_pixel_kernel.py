@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...accel.layouts import NO_RAYS
 from ...device.launches.device_arrays import DeviceArray, empty_array, resident
-from ...device.launches.launch import LaunchEvents, Launches
+from ...device.launches.launch import Launches, LaunchEvents
 from ...device.programs.program import build, make_kernel
 from ...errors import UsageError
 from ..film.tiles import TILE_PIXELS, row_by_row, scattered

@@ -10,7 +10,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from ...device.launches.device_arrays import on_device
-from ...device.launches.launch import LaunchEvents, Launches, calling, wait_for
+from ...device.launches.launch import Launches, LaunchEvents, calling, wait_for
 from ...device.launches.lent_memory import begin_copy
 from ...device.open import Device
 from ...errors import NoRoomError

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from ...accel.methods import TREELESS, BuilderName, HitTests, LayoutName
+from ...device.device_info import Paths
 from ...errors import UsageError
 from ...option_fields import check_values, option
 
@@ -15,10 +16,6 @@ if TYPE_CHECKING:
     from ...device.open import Device
 
 Lanes = Literal[1, 8, 16]
-#: "lanes" is the megakernel, one path per lane (kernels/integrator/path.cl). The others advance many paths together by
-#: one vertex at a time: "waves" those of a tile in one work-item (kernels/integrator/wavefront.cl), "queues" those of a
-#: launch, with a kernel per stage (kernels/integrator/queues.cl).
-Paths = Literal["lanes", "waves", "queues"]
 Offset = Literal["bound", "ulp", "fixed"]
 #: SIMD widths: paths per work-item; and the one that the wavefront needs.
 LANES, WAVE_LANES = get_args(Lanes), 8
@@ -48,8 +45,8 @@ class Choices:
     direct_light: bool = False
     paths: str | None = option(
         None,
-        "lanes: megakernel; waves: wavefront with compaction (needs 8 lanes); queues: a kernel per stage (needs 1 lane). "
-        "Default: by device.",
+        "lanes: megakernel; waves: wavefront in each work-item (needs 8 lanes); queues: wavefront with a kernel per "
+        "stage (needs 1 lane). Default: by device.",
         get_args(Paths),
     )
     tree: bool | None = option(
@@ -88,8 +85,17 @@ class Choices:
         Raises UsageError if the device's SIMD width excludes the chosen paths.
         """
         lanes = self.lanes or (1 if self.paths == "queues" else device.lanes if device else WAVE_LANES)
-        by_device: Paths = "waves" if lanes == WAVE_LANES and (device is None or device.packs) else "lanes"
-        return ResolvedChoices(**{**vars(self), "lanes": lanes, "paths": self.paths or by_device})
+        return ResolvedChoices(**{**vars(self), "lanes": lanes, "paths": self.paths or _paths_on(device, lanes)})
+
+
+def _paths_on(device: Device | None, lanes: int) -> Paths:
+    """Return the execution of paths for this SIMD width: the measured one, else the one expected to be fastest."""
+    tuning = device.info.tuning if device else None
+    if tuning and NEEDED_LANES.get(tuning.paths, lanes) == lanes:
+        return tuning.paths
+    if lanes == WAVE_LANES and (device is None or device.packs):
+        return "waves"
+    return "queues" if lanes == 1 and device is not None and device.info.type == "gpu" else "lanes"
 
 
 @dataclass(frozen=True)

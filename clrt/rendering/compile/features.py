@@ -71,6 +71,7 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
         "CLAMP": bool(biased_by(scene.render)),
         "DIRECT_LIGHT": choices.direct_light,
         "LOOP_LIMIT": loop_limit,
+        "SORT_HITS": choices.paths == "queues" and len(materials.used) > 1,
     }
     has["HORIZON"] = has["SMOOTH_NORMALS"] or has["NORMAL_MAPS"]
     return features | {name for name, present in has.items() if present}
@@ -138,6 +139,7 @@ def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict
         "CAMERA": [camera_file(scene.camera, integrator)],
         "FILTER": ["film/box_filter.cl" if scene.render.filter == "box" else "film/table_filter.cl"],
         "INTEGRATOR": [INTEGRATORS.get(integrator, "integrator/first_surface.cl")],
+        "HIT_ORDER": [f"integrator/queue_{'sorted' if 'SORT_HITS' in features else 'unsorted'}.cl"],
         "PICTURE": [f"integrator/first_surface_{integrator}.cl"],
     }
 
