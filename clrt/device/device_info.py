@@ -42,7 +42,7 @@ class Speed:
 
 #: Executions of paths. "lanes" is the megakernel, one path per lane (kernels/integrator/path.cl). The others advance
 #: many paths together by one vertex at a time: "waves" those of a tile in one work-item
-#: (kernels/integrator/wavefront.cl), "queues" those of a launch, with a kernel per stage (kernels/integrator/queues.cl).
+#: (kernels/integrator/wavefront.cl), "queues" those of a launch, with a kernel per stage (integrator/queues.cl).
 Paths = Literal["lanes", "waves", "queues"]
 #: BVH layouts that a device may be tuned to.
 TunedLayout = Literal["bvh8", "bvh2", "cwbvh"]
