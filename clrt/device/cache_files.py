@@ -22,6 +22,7 @@ KINDS = {
     "probes of drivers": "*.driver.json",
     "checks of devices": "*.check.json",
     "speeds of devices": "*.bench.json",
+    "tunings of devices": "*.tuning.json",
     "loop limits": "*.loops.json",
     "logs": "last-*.log",
     "unfinished files": "unfinished-*",

@@ -5,6 +5,7 @@
 //
 // lengths: for each depth from 1 on, the number of paths and of shadow rays and, if SORT_HITS, of hits of each kind. Of
 // depth 0 only the first is used: it is set if the driver ended loops.
+#include "core/loop_limit.cl"
 #include "integrator/path_segment.cl"
 
 #define SHADOWS (PRIMITIVES && LIGHTS)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.device.device_info import Paths
 from clrt.device.launches.driver_loop_limits import loop_turns, measured_turns
 from clrt.device.open import Device
 from clrt.device.programs import program
@@ -49,8 +50,10 @@ def scene(rows: int = 3) -> Scene:
     )
 
 
-def picture(device: Device, depth: int = 6, rows: int = 3, spp: int = SPP) -> NDArray[np.float32]:
-    renderer = Renderer(scene(rows), device=device.info.id, size=SIZE, max_depth=depth, layout="list")
+def picture(
+    device: Device, depth: int = 6, rows: int = 3, spp: int = SPP, paths: Paths | None = None
+) -> NDArray[np.float32]:
+    renderer = Renderer(scene(rows), device=device.info.id, size=SIZE, max_depth=depth, layout="list", paths=paths)
     *_, state = renderer.passes(spp=spp)
     return state.pixels
 
@@ -66,9 +69,11 @@ def test_a_limit_is_found_where_there_is_one(device: Device) -> None:
 
 
 @pytest.mark.programs
-@pytest.mark.parametrize("turns", [1, 30_000, 100_000])
-def test_short_launches_change_nothing(device: Device, turns: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = picture(device)
+@pytest.mark.parametrize(("turns", "paths"), [(1, None), (30_000, None), (30_000, "queues"), (100_000, None)])
+def test_short_launches_change_nothing(
+    device: Device, turns: int, paths: Paths | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = picture(device, paths=paths)
     limit(monkeypatch, turns)
     launched = list[WorkPart]()
 
@@ -80,7 +85,7 @@ def test_short_launches_change_nothing(device: Device, turns: int, monkeypatch: 
         return part
 
     monkeypatch.setattr(WorkQueue, "cut", cut)
-    assert np.array_equal(picture(device), whole)
+    assert np.array_equal(picture(device, paths=paths), whole)
     most = max(part.more for part in launched)
     # A path vertex traces two rays, each testing the whole list: 6 rows of 6 quads, less a triangle at the poles.
     assert most == 1 or 2 * 6 * 30 * most < turns
@@ -105,13 +110,17 @@ def test_work_is_shortened_in_order() -> None:
 
 
 @pytest.mark.programs
-def test_samples_that_were_ended_are_missed(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Kernels are changed as if the loops of every fifth pixel had been ended."""
+@pytest.mark.parametrize(("paths", "missed"), [(None, r"(77|8\d)"), ("queues", r"384")])
+def test_samples_that_were_ended_are_missed(
+    device: Device, paths: Paths | None, missed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Kernels are changed as if the loops of every fifth pixel had been ended, or of every fifth entry of a queue:
+    launches of queues store all of their samples or none."""
     limit(monkeypatch, 50_000)
     folder = sabotaged(tmp_path / "kernels", r"return a != 31;", "return a != 31 || get_global_id(0) % 5 == 0;")
     monkeypatch.setattr(program, "kernel_folder", lambda: folder)
-    with pytest.raises(DeviceError, match=r"after 50000 iterations, and (77|8\d) of 384 samples .* need more"):
-        picture(device)
+    with pytest.raises(DeviceError, match=rf"after 50000 iterations, and {missed} of 384 samples .* need more"):
+        picture(device, paths=paths)
 
 
 @pytest.mark.programs
