@@ -21,6 +21,7 @@ from .interrupt import Interruptible
 from .load_options import LoadOptions
 from .outputs import Outputs
 from .pipes import split_pipes
+from .previews import Previews
 from .progress_reporter import Progress
 from .render_options import OutputOptions, SavingOptions, StopOptions
 
@@ -95,7 +96,12 @@ class RenderJob:
             return None
         if self.frames.frames is not None and self.loading.animation_time is not None:
             raise UsageError("--animation-time is the time of a still; leave it out, or leave out --frames")
-        still_only = {"checkpoint": self.saving.checkpoint, "reference": self.asked.reference, "plot": self.asked.plot}
+        still_only = {
+            "checkpoint": self.saving.checkpoint,
+            "preview-every": self.saving.preview_every,
+            "reference": self.asked.reference,
+            "plot": self.asked.plot,
+        }
         return make_sequence(self.results, self.frames.frames, self.saving.resume, still_only)
 
     def _check_still(self) -> None:
@@ -163,7 +169,8 @@ class RenderJob:
         with Interruptible(renderer.interrupt) as interruptible:
             try:
                 if self.sequence is None:
-                    render_image(renderer, self.results, goal, expected, self._denoiser, progress)
+                    previews = Previews(self.results, self.saving.preview_every)
+                    render_image(renderer, self.results, goal, expected, self._denoiser, progress, previews)
                 else:
                     _render_frames(renderer, self.sequence, goal, self._denoiser, progress)
             except (DeviceError, OutputError) as failure:
@@ -229,7 +236,13 @@ def _render_frames(
 
 
 def render_image(
-    renderer: Renderer, results: Outputs, goal: Goal, expected: Any, denoiser: Denoiser | None, progress: Progress
+    renderer: Renderer,
+    results: Outputs,
+    goal: Goal,
+    expected: Any,
+    denoiser: Denoiser | None,
+    progress: Progress,
+    previews: Previews | None = None,
 ) -> None:
     """Render to the goal, or until interrupted, and write the results; an interrupted frame is not written."""
     guides = renderer.session.guides() if denoiser else {}
@@ -240,6 +253,8 @@ def render_image(
         unfinished = results.header and renderer.stop_reason == "interrupted"
         if renderer.stop_reason is not None and not unfinished:  # its last checkpoint is written at the same time
             _write(renderer, state, results, denoiser, guides, expected, progress)
+        elif previews is not None and renderer.stop_reason is None:
+            previews.show(renderer, state)
 
 
 def _write(

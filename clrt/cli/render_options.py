@@ -99,6 +99,13 @@ class SavingOptions:
         metavar="SECONDS",
         help="Time between checkpoints; longer if they would take more than 2 % of the time.",
     )
+    preview_every: float | None = flag(
+        "--preview-every",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="SECONDS",
+        help="Write the image so far to its files this often, without AOVs and not denoised; less often if that took "
+        "more than a tenth of the time.",
+    )
     resume: bool = flag(
         "--resume", default=False, is_flag=True, help="Resume from --checkpoint; start afresh if it does not exist yet."
     )
