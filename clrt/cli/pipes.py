@@ -19,7 +19,7 @@ STDOUT = Path("-")
 #: Names of standard output, even if it is redirected to a file.
 ITS_NAMES = (STDOUT, Path("/dev/stdout"), Path("/dev/fd/1"), Path("/proc/self/fd/1"))
 #: Formats that may precede the path, as in "exr:-".
-FORMATS = ("png", "exr", "hdr")
+FORMATS = ("png", "jpg", "webp", "tif", "exr", "hdr")
 
 
 @dataclass(frozen=True)

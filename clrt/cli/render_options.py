@@ -26,8 +26,8 @@ class OutputOptions:
         multiple=True,
         type=FILE,
         metavar="FILE",
-        help="Image to write: .png, .exr or .hdr; may be repeated. - is standard output as PNG, exr:- as OpenEXR. "
-        "Default: <scene>.png in the current folder.",
+        help="Image to write: .png, .jpg, .webp, .tif, .exr or .hdr; may be repeated. - is standard output as PNG, "
+        "exr:- as OpenEXR. Default: <scene>.png in the current folder.",
     )
     aovs: tuple[str, ...] = flag(
         "--aov",

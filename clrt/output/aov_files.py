@@ -1,4 +1,4 @@
-"""AOVs in image files: layers of an .exr, or separate .png files."""
+"""AOVs in image files: layers of an .exr, or separate files."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..aov_types import AOV_TYPES
+from .file_formats import is_shown
 from .view_transform import to_display
 
 FloatArray = NDArray[np.float32]
@@ -33,9 +34,10 @@ def layered(pixels: FloatArray, aovs: Pictures) -> tuple[FloatArray, list[str]]:
 
 
 def files_beside(path: Path, names: Iterable[str]) -> dict[str, Path]:
-    """Return the AOVs' paths for an image at `path`: <stem>.<name>.png for a .png; none for other formats."""
-    png = path.suffix.lower() == ".png"
-    return {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in names if png}
+    """Return the AOVs' paths for an image at `path`: <stem>.<name>.png for a .png, and likewise for other formats with
+    a view transform; none for .exr and .hdr."""
+    shown = is_shown(path)
+    return {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in names if shown}
 
 
 def drawn(name: str, aov: NDArray[np.generic], view: str, exposure: float) -> NDArray[np.uint8]:

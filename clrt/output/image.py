@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from .data_images import shown_data
+from .file_formats import is_shown
 from .images import write_image
 from .report import header_of
 
@@ -34,12 +35,12 @@ class Image:
 
     @with_default_errors
     def save(self, path: StrPath, *, view: str = "srgb", exposure: float = 0.0) -> Path:
-        """Write .exr or .hdr (linear), or .png (through `view`, after multiplication by 2^exposure).
+        """Write .exr or .hdr (linear), or .png, .jpg, .webp, .tif (through `view`, after multiplication by 2^exposure).
 
-        The AOVs become layers of an .exr, and separate .png files for a .png. Raises OutputError if that fails.
+        The AOVs become layers of an .exr, and separate files for formats with a view. Raises OutputError if that fails.
         """
         pixels, data = self.pixels, shown_data(self.report.get("integrator", "path"), self.pixels)
-        if data is not None and Path(path).suffix.lower() == ".png":
+        if data is not None and is_shown(Path(path)):
             pixels, view, exposure = data, "raw", 0.0
         write_image(Path(path), pixels, metadata=self.metadata(), view=view, exposure=exposure, aovs=self.aovs)
         return Path(path)

@@ -1,4 +1,4 @@
-"""Image writing: .exr (float32, linear), .hdr (Radiance RGBE, linear) and .png (8 bits through a view transform)."""
+"""Image writing: .exr (float32, linear), .hdr (Radiance RGBE, linear), and the others through a view transform."""
 
 from __future__ import annotations
 
@@ -15,18 +15,13 @@ from ..file_names import StrPath, utf8_path
 from ..formats.images.image_reader import read_picture
 from .aov_files import Pictures, drawn, files_beside, layered
 from .atomic_files import check_target, replacing
+from .file_formats import DESCRIPTION, FORMATS, described, format_of
 from .truncation import check_whole
-from .view_transform import check_view, to_display
+from .view_transform import check_view, to_levels
 
 FloatArray = NDArray[np.float32]
 
-EXTENSIONS = (".png", ".exr", ".hdr")
-#: Compression settings. A .png at level 1 with differences to the row above (libpng's filter 32) takes 0.12 s for a
-#: noisy 1920x1080 image, level 3 with the library's choice of filters 0.22 s, for a 3 % smaller file.
-ATTRIBUTES: dict[str, dict[str, str | int]] = {
-    ".exr": {"compression": "zip"},
-    ".png": {"png:compressionLevel": 1, "png:filter": 32},
-}
+EXTENSIONS = tuple(FORMATS)
 #: The largest value in RGBE: mantissa 255 of 256, exponent 127.
 RGBE_MAX = 255 / 256 * 2.0**127
 
@@ -44,7 +39,10 @@ def metadata_of(path: Path, name: str) -> str | None:
         return None
     with utf8_path(path) as file:
         opened = oiio.ImageInput.open(str(file))
-    return opened and opened.spec().get_string_attribute(name) or None
+    if not opened:
+        return None
+    spec = opened.spec()
+    return spec.get_string_attribute(name) or described(spec.get_string_attribute(DESCRIPTION)).get(name)
 
 
 def check_writable(path: Path) -> None:
@@ -68,29 +66,30 @@ def write_image(
 ) -> None:
     """Write (h, w, 3) float32 linear pixels in the format of the extension, atomically (see `replacing`).
 
-    `aovs`, if any, become layers of an .exr and separate files for a .png (see `layers`); an .hdr omits them.
+    `aovs`, if any, become layers of an .exr, and separate files for formats with a view; an .hdr omits them.
 
-    `exposure` (stops) and `view` apply to .png only. An .exr is lossless; an .hdr is rounded to RGBE, with NaN and
-    negative values as 0. `metadata` is stored in .exr and .png; names with a colon, such as "clrt:spp", do not collide
-    with the formats' own. Raises OutputError, and UsageError for an unknown view or an exposure that is not finite.
+    `exposure` (stops) and `view` apply to all formats but .exr and .hdr: .png, .jpg and .webp have 8 bits per channel,
+    .tif 16. An .exr is lossless; an .hdr is rounded to RGBE, with NaN and negative values as 0. `metadata` is stored in
+    .exr and .png, and as JSON in the description of a .jpg and .tif; names with a colon, such as "clrt:spp", do not
+    collide with the formats' own. Raises OutputError, and UsageError for an unknown view or an exposure that is not
+    finite.
     """
     path = Path(path)
     check_writable(path)
     check_view(view, exposure)
-    about, aovs = metadata or {}, aovs or {}
-    match path.suffix.lower():
-        case ".png":
-            _tell_flaws(path, pixels)
-            about = {**about, "clrt:view": view, "clrt:exposure": str(exposure)}
-            _write_png(path, to_display(pixels, view, exposure), about)
-        case ".hdr":
-            _tell_flaws(path, pixels)
-            _write(path, rgbe_rounded(pixels), about)
-        case _:
-            samples, names = layered(pixels, aovs)
-            _write(path, samples, {**about, **ATTRIBUTES[".exr"]}, names)
-    for name, other in files_beside(path, aovs).items():
-        _write_png(other, drawn(name, aovs[name], view, exposure), about)
+    kind, about, aovs = format_of(path), metadata or {}, aovs or {}
+    if kind.levels is not None:
+        _tell_flaws(path, pixels)
+        header = kind.header({**about, "clrt:view": view, "clrt:exposure": str(exposure)})
+        _write(path, to_levels(pixels, view, exposure, kind.levels), header)
+        for name, other in files_beside(path, aovs).items():
+            _write(other, drawn(name, aovs[name], view, exposure), header)
+    elif path.suffix.lower() == ".hdr":
+        _tell_flaws(path, pixels)
+        _write(path, rgbe_rounded(pixels), kind.header(about))
+    else:
+        samples, names = layered(pixels, aovs)
+        _write(path, samples, kind.header(about), names)
 
 
 def _tell_flaws(path: Path, pixels: FloatArray) -> None:
@@ -106,11 +105,6 @@ def _tell_flaws(path: Path, pixels: FloatArray) -> None:
             negative,
             infinite,
         )
-
-
-def _write_png(path: Path, samples: NDArray[np.uint8], metadata: Mapping[str, str]) -> None:
-    # sRGB is the default; setting it explicitly takes 25 ms, in which OpenImageIO loads all its color spaces.
-    _write(path, samples, {**metadata, **ATTRIBUTES[".png"]})
 
 
 def write_texels(path: Path, texels: NDArray[np.uint8]) -> None:
@@ -134,7 +128,7 @@ def rgbe_rounded(pixels: FloatArray) -> FloatArray:
 def _write(
     path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int], channels: Sequence[str] = ("R", "G", "B")
 ) -> None:
-    """Write uint8 or float32 samples unchanged, atomically; raises OutputError with the writer's reason."""
+    """Write uint8, uint16 or float32 samples unchanged, atomically; raises OutputError with the writer's reason."""
     with replacing(path) as temporary:
         _write_file(temporary, samples, attributes, channels)
 
@@ -145,7 +139,8 @@ def _write_file(
     import OpenImageIO as oiio
 
     height, width = samples.shape[:2]
-    spec = oiio.ImageSpec(width, height, len(channels), samples.dtype.name if samples.dtype == np.uint8 else "float")
+    # sRGB is the default; setting it explicitly takes 25 ms, in which OpenImageIO loads all its color spaces.
+    spec = oiio.ImageSpec(width, height, len(channels), "float" if samples.dtype == np.float32 else samples.dtype.name)
     spec.channelnames = tuple(channels)
     for name, value in attributes.items():
         spec.attribute(name, value)

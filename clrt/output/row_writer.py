@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .atomic_files import replacing
-from .images import ATTRIBUTES, check_writable, rgbe_rounded
+from .file_formats import format_of
+from .images import check_writable, rgbe_rounded
 from .truncation import check_whole
-from .view_transform import check_view, to_display
+from .view_transform import check_view, to_levels
 
 #: Rows that an .exr compresses together; the rows of every piece but the last must be a multiple of this.
 BLOCK_ROWS = 16
@@ -33,9 +34,9 @@ def write_rows(
 
     check_writable(path)
     check_view(view, exposure)
-    kind, (width, height) = path.suffix.lower(), size
-    spec = oiio.ImageSpec(width, height, 3, "uint8" if kind == ".png" else "float")
-    for name, value in {**(metadata or {}), **ATTRIBUTES.get(kind, {})}.items():
+    kind, (width, height) = format_of(path), size
+    spec = oiio.ImageSpec(width, height, 3, np.dtype(kind.levels).name if kind.levels else "float")
+    for name, value in kind.header(metadata or {}).items():
         spec.attribute(name, value)
     row = 0
     with replacing(path) as temporary:
@@ -43,7 +44,7 @@ def write_rows(
         if output is None or not output.open(str(temporary), spec):
             raise OSError((output or oiio).geterror() or "the writer gave no reason")
         for piece in pieces:
-            samples = _samples(piece, kind, view, exposure)
+            samples = _samples(piece, path, view, exposure)
             if not output.write_scanlines(row, row + len(samples), 0, samples):
                 break
             row += len(samples)
@@ -55,8 +56,8 @@ def write_rows(
         check_whole(temporary)
 
 
-def _samples(piece: NDArray[np.float32], kind: str, view: str, exposure: float) -> NDArray[Any]:
-    """Return the piece as samples for this file format."""
-    if kind == ".png":
-        return to_display(piece, view, exposure)
-    return np.ascontiguousarray(rgbe_rounded(piece) if kind == ".hdr" else piece)
+def _samples(piece: NDArray[np.float32], path: Path, view: str, exposure: float) -> NDArray[Any]:
+    """Return the piece as samples for this file."""
+    if levels := format_of(path).levels:
+        return to_levels(piece, view, exposure, levels)
+    return np.ascontiguousarray(rgbe_rounded(piece) if path.suffix.lower() == ".hdr" else piece)

@@ -11,9 +11,9 @@ PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 
 
 def check_whole(path: Path) -> None:
-    """Raise OSError unless the .png, .exr or .hdr file at `path`, a UTF-8 name, is complete.
+    """Raise OSError unless the image file at `path`, a UTF-8 name, is complete.
 
-    The last row of an .exr or .hdr is read, which decodes one block of an .exr, but all of an .hdr.
+    Of all but .png the last row is read, which decodes one block of an .exr or .tif, but all of the others.
     """
     if not (_ends_as_png(path) if path.suffix == ".png" else _has_last_row(path)):
         raise OSError("its end is missing")

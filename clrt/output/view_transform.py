@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import isfinite
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,8 @@ from .ocio import ACES, ocio_view
 
 FloatArray = NDArray[np.float32]
 View = Callable[[FloatArray], FloatArray]
+#: Kinds of integers that levels are stored as.
+Level = type[np.uint8] | type[np.uint16]
 
 #: The luminance that "reinhard" maps to white: four stops above 1.
 REINHARD_WHITE = 16.0
@@ -122,16 +125,21 @@ def check_view(name: str, exposure: float) -> None:
 
 
 def to_display(pixels: FloatArray, view: str = "srgb", exposure: float = 0.0) -> NDArray[np.uint8]:
-    """Convert (h, w, 3) float32 linear to uint8 of the same shape, after a gain of 2**exposure.
+    """Convert (h, w, 3) float32 linear to uint8 of the same shape, see `to_levels`."""
+    return to_levels(pixels, view, exposure, np.uint8)
 
-    NaN and negative values become 0, +Inf 255; the rest is rounded to nearest, halves up, without dithering.
-    Raises UsageError for an unknown view.
+
+def to_levels(pixels: FloatArray, view: str, exposure: float, kind: Level) -> NDArray[Any]:
+    """Convert (h, w, 3) float32 linear to unsigned integers of the same shape, after a gain of 2**exposure.
+
+    NaN and negative values become 0, +Inf the largest level; the rest is rounded to nearest, halves up, without
+    dithering. Raises UsageError for an unknown view.
     """
-    shown = view_called(view)
-    levels = np.empty(pixels.shape, np.uint8)
+    shown, most = view_called(view), np.float32(np.iinfo(kind).max)
+    levels = np.empty(pixels.shape, kind)
     for first in range(0, len(pixels), ROWS):
         with np.errstate(over="ignore", invalid="ignore"):
             exposed = pixels[first : first + ROWS] * np.exp2(np.float32(exposure))
         linear = np.clip(np.nan_to_num(exposed, nan=0.0, posinf=BRIGHTEST), np.float32(0), np.float32(BRIGHTEST))
-        levels[first : first + ROWS] = np.floor(255 * np.clip(shown(linear), 0, 1) + np.float32(0.5))
+        levels[first : first + ROWS] = np.floor(most * np.clip(shown(linear), 0, 1) + np.float32(0.5))
     return levels

@@ -27,13 +27,15 @@ typedef struct {
     global int *instances;
     global uint *order;  // by kind: the places of its hits
     global float *light;
+    global uint *rays;   // by slot
     uint capacity;       // of each queue
 } Queues;
 
 #define QUEUE_PARAMETERS global uint *queue_lengths, global float4 *path_queue, global float4 *hit_queue, \
                          global int *instance_queue, global uint *hit_order, global float4 *shadow_queue, \
-                         global float *light_of_slots, const uint capacity
-#define QUEUE_ARGUMENTS {queue_lengths, path_queue, hit_queue, shadow_queue, instance_queue, hit_order, light_of_slots, capacity}
+                         global float *light_of_slots, global uint *rays_of_slots, const uint capacity
+#define QUEUE_ARGUMENTS {queue_lengths, path_queue, hit_queue, shadow_queue, instance_queue, hit_order, \
+                         light_of_slots, rays_of_slots, capacity}
 
 static inline global uint *queued_paths(const Queues *q, int depth) { return q->lengths + (2 + KINDS) * depth; }
 static inline global uint *queued_shadows(const Queues *q, int depth) { return queued_paths(q, depth) + 1; }
@@ -59,7 +61,7 @@ static inline uint reserve_if(bool appends, global uint *length, local uint *gro
 // A path between stages. Paths of even and odd depths have their own rows.
 typedef struct {
     Path path;
-    uint slot, dimension;
+    uint slot, dimension, rays;   // rays: traced so far
 } Travel;
 
 static inline float4 row_of(real3 vector, float last) { return (float4)(vector.x, vector.y, vector.z, last); }
@@ -74,7 +76,7 @@ static inline void store_path(const Queues *q, int depth, uint place, const Trav
     row[0] = row_of(t->path.origin, as_float(t->slot));
     row[q->capacity] = row_of(t->path.wi, as_float(t->dimension));
     row[2 * q->capacity] = row_of(t->path.p, t->path.pdf);
-    row[3 * q->capacity] = row_of(t->path.n, as_float(t->path.specular));
+    row[3 * q->capacity] = row_of(t->path.n, as_float(t->rays << 1 | (uint)(t->path.specular != 0)));
 #if TRANSMISSION
     row[4 * q->capacity] = row_of(t->path.beta, t->path.spread);
 #else
@@ -97,7 +99,8 @@ static inline Travel load_path(const Queues *q, int depth, uint place) {
     t.path.p = xyz(p);
     t.path.pdf = p.w;
     t.path.n = xyz(n);
-    t.path.specular = as_int(n.w);
+    t.path.specular = as_int(n.w) & 1;
+    t.rays = as_uint(n.w) >> 1;
     t.path.beta = xyz(beta);
 #if TRANSMISSION
     t.path.spread = beta.w;
@@ -180,7 +183,8 @@ static inline void store_light(const Queues *q, uint slot, uint row, real3 light
     at[(row + 2) * q->capacity] = light.z;
 }
 
-static inline void clear_light(const Queues *q, uint slot) {
+static inline void clear_slot(const Queues *q, uint slot) {
+    q->rays[slot] = 0;
     for (uint row = 0; row < LIGHT_ROWS; ++row) q->light[slot + row * q->capacity] = 0.0f;
 }
 

@@ -5,7 +5,7 @@
 //
 // Kernels of a launch, in order: generate; for each depth extend, sort_hits, shade and connect;
 // update_film. Queue lengths stay on
-// the device. The film is that of the megakernel to the last bit, except that rays are counted per tile: a slot has its
+// the device. The film is that of the megakernel to the last bit, however the work is cut into launches: a slot has its
 // own light, contributions to it are added in the order of the path, and update_film adds the samples of a pixel in
 // their order.
 #include "integrator/camera_rays.cl"
@@ -38,12 +38,13 @@ kernel void generate(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tile
     LanePixels pixel;
     bool seen = travel.slot < launch.pixel_count * launch.sample_count && slot_pixel(&launch, tiles, travel.slot, &pixel);
     if (seen) {
-        clear_light(&q, travel.slot);
+        clear_slot(&q, travel.slot);
         Sampler sampler = slot_sampler(&launch, tiles, travel.slot, 0);
         CameraRay ray;
         seen = camera_ray(&scene, &launch, pixel.x, pixel.y, next_2d(&sampler), &sampler, &ray);
         travel.path = path_along(ray.origin, ray.direction);
         travel.dimension = sampler.dimension;
+        travel.rays = 0;
     }
     uint place = reserve_if(seen, queued_paths(&q, 1), group);
     if (seen) store_path(&q, 1, place, &travel);
@@ -120,6 +121,7 @@ kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, 
         if (used) {
             Hits hits = load_hits(&q, i);
             shaded.travel = load_path(&q, depth, i);
+            ++shaded.travel.rays;
             if (hits.primitive < 0) {
                 Path *path = &shaded.travel.path;
                 absorb(path, INFINITY);
@@ -132,7 +134,9 @@ kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, 
 #if SHADOWS
         uint ray = reserve_if(shaded.sends, queued_shadows(&q, depth), group);
         if (shaded.sends) store_shadow(&q, ray, &shaded.shadow, shaded.travel.slot);
+        shaded.travel.rays += shaded.sends;
 #endif
+        if (used && !shaded.goes) q.rays[shaded.travel.slot] = shaded.travel.rays;
         uint place = reserve_if(shaded.goes, queued_paths(&q, depth + 1), group);
         if (shaded.goes) store_path(&q, depth + 1, place, &shaded.travel);
     }
@@ -152,21 +156,16 @@ kernel void connect(SCENE_PARAMETERS, QUEUE_PARAMETERS, const Launch launch, con
 }
 #endif
 
-// Stage 6: add the samples of each pixel in order. The rays of the launch are counted in the first pixels of its tiles.
+// Stage 6: add the samples of each pixel in order.
 kernel void update_film(QUEUE_PARAMETERS, global Pixel *film, global const uint *tiles, const Launch launch) {
     const Queues q = QUEUE_ARGUMENTS;
     LanePixels own;
     if (!lane_pixels(&launch, tiles, &own) || q.lengths[0]) return;
     Accumulator pixel = load_pixels(film, own.index);
-    uint first = (uint)get_global_id(0), tile = first / (TILE * TILE);
-    if (first % (TILE * TILE) == 0) {
-        uint rays = 0, tile_count = launch.pixel_count / (TILE * TILE);
-        for (int depth = 1; depth <= launch.max_depth; ++depth) rays += *queued_paths(&q, depth) + *queued_shadows(&q, depth);
-        pixel.rays += rays / tile_count + (tile < rays % tile_count);
-    }
     for (uint s = 0; s < launch.sample_count; ++s) {
-        uint slot = s * launch.pixel_count + first;
+        uint slot = s * launch.pixel_count + (uint)get_global_id(0);
         ireal kept = accumulate(&pixel, slot_light(&q, slot, 0), true);
+        pixel.rays += q.rays[slot];
 #if DIRECT_LIGHT
         accumulate_direct(&pixel, slot_light(&q, slot, DIRECT_ROW), kept);
 #endif

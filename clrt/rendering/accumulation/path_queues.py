@@ -37,6 +37,7 @@ def slot_bytes(compiled: CompiledScene) -> dict[str, int]:
         "order": kind_count(compiled) * WORD,
         "shadows": has["LIGHTS"] * SHADOW_ROWS * ROW,
         "light": (LIGHT_WORDS * (1 + has["DIRECT_LIGHT"]) + has["CLAMP"]) * WORD,
+        "rays": WORD,
     }
 
 
