@@ -47,5 +47,5 @@ class Previews:
                 image.save(path, view=self._results.view, exposure=self._results.exposure)
             except OutputError as error:
                 if path not in self._failed:
-                    logging.getLogger(__name__).warning("%s; the render goes on without previews there", error)
+                    logging.getLogger(__name__).warning("%s; the render continues without previews there", error)
                 self._failed.add(path)

@@ -15,7 +15,7 @@ from ..file_names import StrPath, utf8_path
 from ..formats.images.image_reader import read_picture
 from .aov_files import Pictures, drawn, files_beside, layered
 from .atomic_files import check_target, replacing
-from .file_formats import DESCRIPTION, FORMATS, described, format_of
+from .file_formats import DESCRIPTION, FORMATS, EncodedFormat, described, format_of
 from .truncation import check_whole
 from .view_transform import check_view, to_levels
 
@@ -80,10 +80,10 @@ def write_image(
     kind, about, aovs = format_of(path), metadata or {}, aovs or {}
     if kind.levels is not None:
         _tell_flaws(path, pixels)
-        header = kind.header({**about, "clrt:view": view, "clrt:exposure": str(exposure)})
-        _write(path, to_levels(pixels, view, exposure, kind.levels), header)
+        about = {**about, "clrt:view": view, "clrt:exposure": str(exposure)}
+        write_levels(path, to_levels(pixels, view, exposure, kind.levels), about)
         for name, other in files_beside(path, aovs).items():
-            _write(other, drawn(name, aovs[name], view, exposure), header)
+            write_levels(other, drawn(name, aovs[name], view, exposure), about)
     elif path.suffix.lower() == ".hdr":
         _tell_flaws(path, pixels)
         _write(path, rgbe_rounded(pixels), kind.header(about))
@@ -105,6 +105,17 @@ def _tell_flaws(path: Path, pixels: FloatArray) -> None:
             negative,
             infinite,
         )
+
+
+def write_levels(path: Path, levels: NDArray[Any], metadata: Mapping[str, str]) -> None:
+    """Write (h, w, 3) unsigned integers in a format with a view, atomically. Raises OutputError."""
+    kind = format_of(path)
+    if isinstance(kind, EncodedFormat):
+        content = kind.encoded(path, levels, metadata)
+        with replacing(path) as temporary:
+            temporary.write_bytes(content)
+    else:
+        _write(path, levels, kind.header(metadata))
 
 
 def write_texels(path: Path, texels: NDArray[np.uint8]) -> None:

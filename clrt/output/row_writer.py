@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .atomic_files import replacing
-from .file_formats import format_of
-from .images import check_writable, rgbe_rounded
+from .file_formats import EncodedFormat, format_of
+from .images import check_writable, rgbe_rounded, write_levels
 from .truncation import check_whole
 from .view_transform import check_view, to_levels
 
@@ -35,6 +35,9 @@ def write_rows(
     check_writable(path)
     check_view(view, exposure)
     kind, (width, height) = format_of(path), size
+    if isinstance(kind, EncodedFormat):  # encoded in memory
+        levels = [_samples(piece, path, view, exposure) for piece in pieces]
+        return write_levels(path, np.concatenate(levels), metadata or {})
     spec = oiio.ImageSpec(width, height, 3, np.dtype(kind.levels).name if kind.levels else "float")
     for name, value in kind.header(metadata or {}).items():
         spec.attribute(name, value)

@@ -100,7 +100,7 @@ def test_images(folder: Path, form: str, redirection: str) -> None:
         ("-o - --turntable 2", 2, "takes one image"),
         ("-o - -o exr:-", 2, "given twice"),
         ("-o - --aov depth", 2, ".exr or .png"),
-        ("-o tif:-", 6, "png, exr or hdr"),
+        ("-o xyz:-", 6, "png, jpg, webp, tif, exr or hdr"),
         ("-o - >&-", 2, "is closed"),
     ],
 )

@@ -61,7 +61,7 @@ def test_a_file_that_cannot_be_written(tmp_path: Path) -> None:
     (folder / "a.png").unlink()
     folder.rmdir()
     told = job.communicate()[1]
-    assert told.count("goes on without previews") == 1 and "Traceback" not in told, told
+    assert told.count("continues without previews") == 1 and "Traceback" not in told, told
     assert job.returncode == 6 and "written to" in told, told
 
 

@@ -48,7 +48,7 @@ def test_levels_are_those_of_the_view(tmp_path: Path, suffix: str) -> None:
     write_image(path, pixels, view="agx", exposure=0.5)
     error = np.abs(255 * read(path) - to_display(pixels, "agx", 0.5))
     assert error.max() <= (3.01 if suffix.startswith(".j") else 0.51)
-    assert metadata_of(path, "clrt:view") == (None if suffix == ".webp" else "agx")
+    assert metadata_of(path, "clrt:view") == "agx"
 
 
 @pytest.mark.parametrize("suffix", SHOWN)
@@ -64,7 +64,7 @@ def test_aovs_have_their_own_files(tmp_path: Path, suffix: str) -> None:
     image = Image(picture(), {"spp": 64}, aovs={"albedo": picture()})
     image.save(tmp_path / f"a{suffix}")
     assert {path.name for path in tmp_path.iterdir()} == {f"a{suffix}", f"a.albedo{suffix}"}
-    assert metadata_of(tmp_path / f"a{suffix}", "clrt:spp") == (None if suffix == ".webp" else "64")
+    assert metadata_of(tmp_path / f"a{suffix}", "clrt:spp") == "64"
 
 
 def test_sixteen_bits_are_finer(tmp_path: Path) -> None:

@@ -150,7 +150,7 @@ def test_exr_is_compressed_float(tmp_path: Path) -> None:
     "name, message",
     [
         ("picture.pgn", r"picture\.pgn: unknown image format \.pgn; use .*did you mean .*picture\.png\?"),
-        ("picture.xyz", r"unknown image format \.xyz; use \.png, \.exr or \.hdr$"),
+        ("picture.xyz", r"unknown image format \.xyz; use \.png, .*, \.tiff or \.webp$"),
         ("picture", r"the name has no extension; use"),
         ("missing/deeper/a.png", r"the folder .*missing/deeper does not exist; create it first"),
         ("folder.png", r"folder\.png: is a folder; choose a file in it"),
