@@ -28,7 +28,7 @@ FLIP_MIN = 1e-5
 def compare_files(image: Path, reference: Path) -> dict[str, Any]:
     """Run `compare` on two image files, with HDR-FLIP if either is .exr or .hdr. Raises SceneError naming the files."""
     pixels, truth = read_picture(image), read_picture(reference)
-    _check_sizes(pixels, truth, str(image), str(reference))
+    check_sizes(pixels, truth, str(image), str(reference))
     return _measures(pixels, truth, bool({image.suffix.lower(), reference.suffix.lower()} & {".exr", ".hdr"}))
 
 
@@ -47,7 +47,7 @@ def compare(image: AnyImage, reference: AnyImage, *, hdr: bool = True) -> dict[s
     Raises SceneError if a file cannot be read or the sizes differ, and UsageError if an argument is not an image.
     """
     x, r = _pixels(image, "the image"), _pixels(reference, "the reference")
-    _check_sizes(x, r, "the image", "the reference")
+    check_sizes(x, r, "the image", "the reference")
     return _measures(x, r, hdr)
 
 
@@ -107,7 +107,8 @@ def _flip(image: FloatArray, reference: FloatArray, hdr: bool) -> float | None:
     return float(mean) if np.isfinite(mean) else None
 
 
-def _check_sizes(image: FloatArray, reference: FloatArray, image_name: str, reference_name: str) -> None:
+def check_sizes(image: FloatArray, reference: FloatArray, image_name: str, reference_name: str) -> None:
+    """Raise SceneError, by these names, unless both images have the same size."""
     if image.shape != reference.shape:
         (h, w), (height, width) = image.shape[:2], reference.shape[:2]
         raise SceneError(
