@@ -1,0 +1,101 @@
+"""Compile times of scenes in new processes, with empty caches and from them, and what the compiler reports.
+
+`python -m clrt.bench.gpu.compiles JSON` is such a process.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from subprocess import DEVNULL, TimeoutExpired
+from tempfile import TemporaryDirectory, TemporaryFile
+from typing import Any
+
+from ...device.programs.child_process import end_child, last_line, start_child, told_end
+from ...device.programs.kernel_resources import kernel_resources
+from ...errors import DeviceError
+from ...formats.load_scene import load
+from ...rendering.renderer import Renderer
+from .gallery import SMALL, smaller
+from .request import Item, Request, Row
+
+#: Scenes from small programs to large ones.
+SCENES = ("furnace", "cornell", "dragon", "glass", "materials", "textures")
+#: Environment variables of program caches: clrt's, PoCL's, and those of the drivers of NVIDIA, Intel, AMD and Mesa.
+CACHES = (
+    "CLRT_CACHE_DIR",
+    "POCL_CACHE_DIR",
+    "CUDA_CACHE_PATH",
+    "NEO_CACHE_DIR",
+    "AMD_COMGR_CACHE_DIR",
+    "MESA_SHADER_CACHE_DIR",
+)
+
+
+def items(request: Request) -> Iterator[Item]:
+    """Yield scenes."""
+    files = {file.stem: file for file in map(Path, request.scenes)}
+    chosen = [files[name] for name in SCENES if name in files] or list(files.values())
+    for file in chosen[: 1 if request.quick else None]:
+        yield Item(file.stem, partial(_compile, file, request))
+
+
+def _compile(file: Path, request: Request) -> Row:
+    with TemporaryDirectory() as cache:
+        cold = _in_new_process(file, request, cache, resources=False)
+        warm = _in_new_process(file, request, cache, resources=True)
+    return {
+        "characters": cold["characters"],
+        "cold_seconds": cold["program_seconds"],
+        "warm_seconds": warm["program_seconds"],
+        "cold_ready_seconds": cold["ready_seconds"],
+        "warm_ready_seconds": warm["ready_seconds"],
+        **warm["resources"],
+    }
+
+
+def _in_new_process(file: Path, request: Request, cache: str, *, resources: bool) -> dict[str, Any]:
+    argument = json.dumps({"file": str(file), "device": request.device, "resources": resources})
+    with TemporaryFile() as output, TemporaryFile() as errors:
+        child = start_child(__name__, argument, output, errors, DEVNULL, **dict.fromkeys(CACHES, cache))
+        try:
+            code = child.wait(request.seconds)
+        except TimeoutExpired as error:
+            raise DeviceError(f"{file.stem} was not compiled in {request.seconds:g} s") from error
+        finally:
+            end_child(child)
+        if code:
+            raise DeviceError(f"{file.stem} was not compiled: {told_end(code)}{last_line(errors)}")
+        output.seek(0)
+        figures: dict[str, Any] = json.loads(output.read())
+        return figures
+
+
+def compile_here(file: str, device: str, *, resources: bool) -> dict[str, Any]:
+    """Compile a scene file in this process; resources: whether to ask the compiler for registers and memory."""
+    scene = smaller(load(file), SMALL)
+    start = time.perf_counter()
+    renderer = Renderer(scene, device=device)
+    ready, compiled = time.perf_counter() - start, renderer.compiled
+    return {
+        "ready_seconds": ready,
+        "program_seconds": renderer.session.build_seconds,
+        "characters": len(compiled.source),
+        "resources": kernel_resources(renderer.device, compiled.source)[compiled.kernel] if resources else {},
+    }
+
+
+def main() -> None:
+    """Print the figures as JSON; what drivers print goes to standard error."""
+    with os.fdopen(os.dup(1), "w", encoding="utf-8") as result:
+        os.dup2(2, 1)
+        json.dump(compile_here(**json.loads(sys.argv[1])), result)
+
+
+if __name__ == "__main__":
+    main()
