@@ -46,6 +46,8 @@ COLUMNS = {
         Column("pixels equal", "equal", ".4f"),
         Column("within 0.1 %", "near", ".4f"),
         Column("mean over the reference's", "reference_ratio", ".4f"),
+        Column("programs", "programs"),
+        Column("compiled in s", "program_seconds", ".2f"),
     ],
     "rays": [
         Column("builder", "builder"),

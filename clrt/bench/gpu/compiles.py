@@ -20,9 +20,10 @@ from ...device.programs.child_process import end_child, last_line, start_child, 
 from ...device.programs.kernel_resources import kernel_resources
 from ...errors import DeviceError
 from ...formats.load_scene import load
+from ...rendering.compile.choices import Paths
 from ...rendering.renderer import Renderer
-from .gallery import SMALL, smaller
 from .request import Item, Request, Row
+from .small_scenes import smaller
 
 #: Scenes from small programs to large ones.
 SCENES = ("furnace", "cornell", "dragon", "glass", "materials", "textures")
@@ -47,8 +48,10 @@ def items(request: Request) -> Iterator[Item]:
 
 def _compile(file: Path, request: Request) -> Row:
     with TemporaryDirectory() as cache:
-        cold = _in_new_process(file, request, cache, resources=False)
-        warm = _in_new_process(file, request, cache, resources=True)
+        cold, warm = (
+            compile_in_process(file, request.device, request.seconds, cache, resources=resources)
+            for resources in (False, True)
+        )
     return {
         "characters": cold["characters"],
         "cold_seconds": cold["program_seconds"],
@@ -59,14 +62,27 @@ def _compile(file: Path, request: Request) -> Row:
     }
 
 
-def _in_new_process(file: Path, request: Request, cache: str, *, resources: bool) -> dict[str, Any]:
-    argument = json.dumps({"file": str(file), "device": request.device, "resources": resources})
+def compile_in_process(
+    file: Path,
+    device: str,
+    limit: float,
+    cache: str | None = None,
+    *,
+    resources: bool = False,
+    paths: Paths | None = None,
+) -> dict[str, Any]:
+    """Return what `compile_here` returns in a new process with this folder of all caches, None for the user's.
+
+    Raises DeviceError if that fails or takes more than `limit` seconds.
+    """
+    argument = json.dumps({"file": str(file), "device": device, "resources": resources, "paths": paths})
+    caches = {} if cache is None else dict.fromkeys(CACHES, cache)
     with TemporaryFile() as output, TemporaryFile() as errors:
-        child = start_child(__name__, argument, output, errors, DEVNULL, **dict.fromkeys(CACHES, cache))
+        child = start_child(__name__, argument, output, errors, DEVNULL, **caches)
         try:
-            code = child.wait(request.seconds)
+            code = child.wait(limit)
         except TimeoutExpired as error:
-            raise DeviceError(f"{file.stem} was not compiled in {request.seconds:g} s") from error
+            raise DeviceError(f"{file.stem} was not compiled in {limit:g} s") from error
         finally:
             end_child(child)
         if code:
@@ -76,11 +92,11 @@ def _in_new_process(file: Path, request: Request, cache: str, *, resources: bool
         return figures
 
 
-def compile_here(file: str, device: str, *, resources: bool) -> dict[str, Any]:
+def compile_here(file: str, device: str, *, resources: bool, paths: Paths | None) -> dict[str, Any]:
     """Compile a scene file in this process; resources: whether to ask the compiler for registers and memory."""
-    scene = smaller(load(file), SMALL)
+    scene = smaller(load(file))
     start = time.perf_counter()
-    renderer = Renderer(scene, device=device)
+    renderer = Renderer(scene, device=device, paths=paths)
     ready, compiled = time.perf_counter() - start, renderer.compiled
     return {
         "ready_seconds": ready,

@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import partial
-from math import ceil
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...device.open import Selectors, open_device
+from ...device.open import open_device
 from ...formats.load_scene import load
 from ...output.images import read_image
 from ...rendering.compile.choices import Paths
 from ...rendering.renderer import Renderer
 from ...scene.model import Scene
+from .programs import compile_ahead
 from .request import Item, Request, Row
+from .small_scenes import smaller
 
 #: Samples per pixel, and width in pixels, of images to compare; with --quick.
-SPP, WIDTH, QUICK_SPP, QUICK_WIDTH = 16, 256, 1, 16
-#: Width of images whose speed is measured with --quick; otherwise it is the scene's.
-SMALL = 24
+SPP, WIDTH, QUICK_SPP, QUICK_WIDTH = 16, 512, 1, 16
 #: Seconds of rendering before the measurement, in which launches grow to their full size, and of the measurement.
 WARM_UP, MEASURED = 0.5, 1.0
 #: Pixels are near if they differ by less than this fraction; single paths may take another branch after rounding.
@@ -32,7 +30,8 @@ NEAR = 1e-3
 
 
 def image_items(request: Request) -> Iterator[Item]:
-    """Yield the scenes, to compare their images."""
+    """Yield the programs of all scenes, compiled ahead, then the scenes, to compare their images."""
+    yield Item("programs", partial(compile_ahead, request))
     for file in map(Path, request.scenes):
         yield Item(file.stem, partial(_compare, file, request))
 
@@ -86,7 +85,7 @@ def _speed(file: Path, paths: Paths, request: Request) -> Row:
     start = time.perf_counter()
     scene = load(file)
     loaded = time.perf_counter()
-    scene = smaller(scene, SMALL) if request.quick else scene
+    scene = smaller(scene) if request.quick else scene
     renderer = Renderer(scene, device=open_device(request.device), spp=None, paths=paths, seed=1)
     ready = time.perf_counter()
     tree = renderer.compiled.tree
@@ -127,16 +126,3 @@ def _render_for(renderer: Renderer, seconds: float) -> None:
         if time.perf_counter() >= end:
             break
     session.wait()
-
-
-def smaller(scene: Scene, width: int) -> Scene:
-    """Return the scene at most this wide, with the same aspect ratio."""
-    across, down = scene.render.size
-    if across <= width:
-        return scene
-    return replace(scene, render=replace(scene.render, size=(width, ceil(down * width / across))))
-
-
-def renderer_of(file: Path, device: Selectors, **options: Any) -> Renderer:
-    """Return a renderer of a scene file."""
-    return Renderer(load(file), device=device, **options)

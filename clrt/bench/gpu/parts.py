@@ -17,9 +17,9 @@ class Part(NamedTuple):
 
 
 PARTS = {
-    "device": Part("Device", 6, facts.items),
+    "device": Part("Device", 12, facts.items),
     "hits": Part("Hits", 7, hits.items),
-    "images": Part("Images", 16, gallery.image_items),
+    "images": Part("Images", 20, gallery.image_items),
     "rays": Part("Rays", 16, ray_rates.layout_items),
     "samples": Part("Samples", 20, gallery.speed_items),
     "groups": Part("Work-group sizes", 8, ray_rates.group_items),

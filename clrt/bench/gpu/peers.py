@@ -16,8 +16,8 @@ from ..rays.ray_libraries import Call, clrt, warp
 from ..rays.workloads import bumpy_ball, closed_room, workloads
 from ..renderers.mitsuba_renderer import Mitsuba, load as load_mitsuba
 from ..renderers.mitsuba_scene import mitsuba_scene
-from .gallery import SMALL, smaller
 from .request import Item, Request, Row
+from .small_scenes import smaller
 
 SUBDIVISIONS, SIDE, QUICK_SUBDIVISIONS, QUICK_SIDE = 7, 1024, 2, 16
 #: Scenes, of those that Mitsuba has equivalents for, and samples per pixel.
@@ -72,7 +72,7 @@ def _mitsuba(file: Path, quick: bool, variant: str | None) -> Row:
         library, name = load_mitsuba(variant)
     except ImportError as error:
         raise UsageError("Mitsuba is not installed (pip install mitsuba)") from error
-    scene = smaller(load(file), SMALL) if quick else load(file)
+    scene = smaller(load(file)) if quick else load(file)
     renderer, spp = Mitsuba(library, mitsuba_scene(scene)), 1 if quick else SPP
     image = min((renderer(spp, seed) for seed in range(2)), key=lambda image: image.seconds)
     width, height = scene.render.size

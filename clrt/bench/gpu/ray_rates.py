@@ -19,8 +19,9 @@ from ..rays.device_speed import BUSY, MEASURED, busy_side, shortest_seconds
 from ..rays.layout_speed import CONTESTANTS
 from ..rays.ray_speed import Run, every
 from ..rays.workloads import Workload, bumpy_ball, closed_room, workloads
-from .gallery import SMALL, smaller, steady_rate
+from .gallery import steady_rate
 from .request import Item, Request, Row
+from .small_scenes import smaller
 
 #: Subdivisions of the bumpy ball, and the side of the image that the camera rays form; with --quick.
 SUBDIVISIONS, LARGEST, QUICK_SUBDIVISIONS, QUICK_LARGEST = 7, 2048, 2, 16
@@ -124,8 +125,8 @@ class GroupedDevice(Device):
 def group_items(request: Request) -> Iterator[Item]:
     """Yield each size of work-groups with rays, then with scenes."""
     rays, device = Rays(request), open_device(request.device)
-    groups = FEW_GROUPS if device.local_size == 1 else GROUPS
-    groups = tuple(each for each in groups if each <= device.cl.max_work_group_size)
+    usual, most = FEW_GROUPS if device.local_size == 1 else GROUPS, device.cl.max_work_group_size
+    groups = [each for each in usual if each <= most]
     for group in groups:
         for kind in KINDS[:2]:
             yield Item(f"{kind}, {group}", partial(_group_rate, rays, kind, group, request.quick))
@@ -141,6 +142,6 @@ def _group_rate(rays: Rays, kind: str, group: int, quick: bool) -> Row:
 
 
 def _group_paths(file: Path, device: Device, group: int, quick: bool) -> Row:
-    scene = smaller(load(file), SMALL) if quick else load(file)
+    scene = smaller(load(file)) if quick else load(file)
     renderer = Renderer(scene, device=GroupedDevice.of(device, group), spp=None, seed=1)
     return {"of": file.stem, "group": group, **(steady_rate(renderer, 0.0, 0.0) if quick else steady_rate(renderer))}

@@ -15,7 +15,7 @@ from ...device.programs.child_results import child_results
 from .request import Request, Row
 
 #: An item that takes this share of the part's seconds, and at least so many, has not finished.
-MOST, LEAST = 0.6, 20.0
+MOST, LEAST = 0.8, 20.0
 #: Seconds for a child to exit after its last result.
 EXIT = 10.0
 CHILD = f"{__package__}.part_process"
