@@ -33,6 +33,7 @@ def page_of(results: Mapping[str, Any]) -> str:
         f"{device['compute_units']} compute units, {device['global_bytes'] / 2**30:.1f} GiB",
         f"{system['begun']}, {system['system']}, Python {system['python']}; clrt {identity['clrt']}, "
         f"kernels {identity['kernels'][:12]}{', quick: figures of speed mean nothing' if identity['quick'] else ''}",
+        *(f"known fault of this driver: {fault}" for fault in device.get("known_faults", ())),
         f"compared with {other['name']} ({other['platform']})" if other else "no other device to compare with",
     ]
     return "\n".join(
