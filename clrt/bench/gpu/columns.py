@@ -111,14 +111,11 @@ COLUMNS = {
 }
 
 
-def rows_of(name: str, part: Mapping[str, Any]) -> dict[str, Row]:
-    """Return the rows of a part's table: of frames, one for each variant of an experiment."""
+def rows_of(part: Mapping[str, Any]) -> dict[str, Row]:
+    """Return the rows of a part's table: an item that has `rows` of its own has one for each, with what they share."""
     rows: dict[str, Row] = {}
     for item, row in part["rows"].items():
-        if name != "frames" or "rows" not in row:
-            rows[item] = row
-            continue
-        width, height = row["size"]
-        shared = {"size": f"{width}x{height}", "triangles": row["triangles"], "machine": row["machine"]}
-        rows |= {f"{item}: {variant}": {**shared, **figures} for variant, figures in row["rows"].items()}
+        own = row.get("rows") or {}
+        shared = {key: value for key, value in row.items() if key != "rows"}
+        rows |= {f"{item}: {name}": {**shared, **figures} for name, figures in own.items()} or {item: shared}
     return rows

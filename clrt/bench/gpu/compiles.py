@@ -14,19 +14,20 @@ from functools import partial
 from pathlib import Path
 from subprocess import DEVNULL, TimeoutExpired
 from tempfile import TemporaryDirectory, TemporaryFile
-from typing import Any
+from typing import Any, get_args
 
+from ...device.open import open_device
 from ...device.programs.child_process import end_child, last_line, start_child, told_end
 from ...device.programs.kernel_resources import kernel_resources
 from ...errors import DeviceError
 from ...formats.load_scene import load
-from ...rendering.compile.choices import Paths
+from ...rendering.compile.choices import Choices, Paths
 from ...rendering.renderer import Renderer
 from .request import Item, Request, Row
 from .small_scenes import smaller
 
 #: Scenes from small programs to large ones.
-SCENES = ("furnace", "cornell", "dragon", "glass", "materials", "textures")
+SCENES = ("cornell", "dragon", "materials", "textures")
 #: Environment variables of program caches: clrt's, PoCL's, and those of the drivers of NVIDIA, Intel, AMD and Mesa.
 CACHES = (
     "CLRT_CACHE_DIR",
@@ -39,17 +40,20 @@ CACHES = (
 
 
 def items(request: Request) -> Iterator[Item]:
-    """Yield scenes."""
+    """Yield some of the scenes with each of `Paths`."""
     files = {file.stem: file for file in map(Path, request.scenes)}
     chosen = [files[name] for name in SCENES if name in files] or list(files.values())
-    for file in chosen[: 1 if request.quick else None]:
-        yield Item(file.stem, partial(_compile, file, request))
+    for paths in get_args(Paths):
+        for file in chosen[: 1 if request.quick else None]:
+            yield Item(f"{file.stem}, {paths}", partial(_compile, file, paths, request))
 
 
-def _compile(file: Path, request: Request) -> Row:
+def _compile(file: Path, paths: Paths, request: Request) -> Row:
+    """Return the seconds, and `rows` with the resources of each kernel of the program."""
+    Choices(paths=paths).on(open_device(request.device))
     with TemporaryDirectory() as cache:
         cold, warm = (
-            compile_in_process(file, request.device, request.seconds, cache, resources=resources)
+            compile_in_process(file, request.device, request.seconds, cache, resources=resources, paths=paths)
             for resources in (False, True)
         )
     return {
@@ -58,7 +62,7 @@ def _compile(file: Path, request: Request) -> Row:
         "warm_seconds": warm["program_seconds"],
         "cold_ready_seconds": cold["ready_seconds"],
         "warm_ready_seconds": warm["ready_seconds"],
-        **warm["resources"],
+        "rows": warm["resources"],
     }
 
 
@@ -97,12 +101,12 @@ def compile_here(file: str, device: str, *, resources: bool, paths: Paths | None
     scene = smaller(load(file))
     start = time.perf_counter()
     renderer = Renderer(scene, device=device, paths=paths)
-    ready, compiled = time.perf_counter() - start, renderer.compiled
+    ready, source = time.perf_counter() - start, renderer.compiled.source
     return {
         "ready_seconds": ready,
         "program_seconds": renderer.session.build_seconds,
-        "characters": len(compiled.source),
-        "resources": kernel_resources(renderer.device, compiled.source)[compiled.kernel] if resources else {},
+        "characters": len(source),
+        "resources": kernel_resources(renderer.device, source) if resources else {},
     }
 
 

@@ -31,4 +31,5 @@ def _with_trees(experiment: Experiment) -> Experiment:
 
 def _measure(experiment: Experiment, effort: Effort, device: str) -> Row:
     result = measure_experiment(experiment, effort, device=device)
-    return {name: result[name] for name in ("title", "machine", "size", "triangles", "rows")}
+    width, height = result["size"]
+    return {**{name: result[name] for name in ("title", "machine", "triangles", "rows")}, "size": f"{width}x{height}"}

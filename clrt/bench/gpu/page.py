@@ -58,7 +58,7 @@ def _part(name: str, part: Mapping[str, Any]) -> Iterator[str]:
         if name in PLOTS and (svg := svg_of(PLOTS[name], part)):
             yield svg
     if name in COLUMNS:
-        yield from _table(COLUMNS[name], rows_of(name, part))
+        yield from _table(COLUMNS[name], rows_of(part))
     else:
         yield from (_facts(item, row) for item, row in part["rows"].items())
 

@@ -109,7 +109,7 @@ def _builds(axis: Axes, rows: Mapping[str, Row]) -> float:
 
 
 def _frames(axis: Axes, rows: Mapping[str, Row]) -> float:
-    variants = rows_of("frames", {"rows": rows})
+    variants = rows_of({"rows": rows})
     values = {
         item: {"clrt": 1e3 * row["seconds"], **({"theirs": 1e3 * row["theirs"]} if row["theirs"] else {})}
         for item, row in variants.items()

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from statistics import median
+from typing import get_args
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ...accel.methods import TREELESS
 from ...device.open import Device, open_device
 from ...formats.load_scene import load
 from ...queries.mesh import RayQuery
+from ...rendering.compile.choices import Paths
 from ...rendering.renderer import Renderer
 from ..rays.device_speed import BUSY, MEASURED, busy_side, shortest_seconds
 from ..rays.layout_speed import CONTESTANTS
@@ -28,7 +30,7 @@ SUBDIVISIONS, LARGEST, QUICK_SUBDIVISIONS, QUICK_LARGEST = 7, 2048, 2, 16
 #: Sizes of work-groups: those of a device that vectorizes over work-items, and of one that does not.
 GROUPS, FEW_GROUPS = (32, 64, 128, 256), (1, 2, 4)
 #: Scenes whose paths are traced with each size of work-groups.
-GROUP_SCENES = ("cornell", "dragon", "materials")
+GROUP_SCENES = ("cornell", "materials")
 
 
 class Rays:
@@ -131,8 +133,10 @@ def group_items(request: Request) -> Iterator[Item]:
         for kind in KINDS[:2]:
             yield Item(f"{kind}, {group}", partial(_group_rate, rays, kind, group, request.quick))
     for file in map(Path, request.scenes):
-        for group in groups if file.stem in GROUP_SCENES else ():
-            yield Item(f"{file.stem}, {group}", partial(_group_paths, file, device, group, request.quick))
+        for paths in get_args(Paths) if file.stem in GROUP_SCENES else ():
+            for group in groups:
+                measure = partial(_group_paths, file, paths, device, group, request.quick)
+                yield Item(f"{file.stem}, {paths}, {group}", measure)
 
 
 def _group_rate(rays: Rays, kind: str, group: int, quick: bool) -> Row:
@@ -141,7 +145,8 @@ def _group_rate(rays: Rays, kind: str, group: int, quick: bool) -> Row:
     return {"of": kind, "group": group, **_rate(query, rays.kinds[kind], 0.0 if quick else MEASURED)}
 
 
-def _group_paths(file: Path, device: Device, group: int, quick: bool) -> Row:
+def _group_paths(file: Path, paths: Paths, device: Device, group: int, quick: bool) -> Row:
     scene = smaller(load(file)) if quick else load(file)
-    renderer = Renderer(scene, device=GroupedDevice.of(device, group), spp=None, seed=1)
-    return {"of": file.stem, "group": group, **(steady_rate(renderer, 0.0, 0.0) if quick else steady_rate(renderer))}
+    renderer = Renderer(scene, device=GroupedDevice.of(device, group), spp=None, paths=paths, seed=1)
+    rate = steady_rate(renderer, 0.0, 0.0) if quick else steady_rate(renderer)
+    return {"of": f"{file.stem}, {paths}", "group": group, **rate}
