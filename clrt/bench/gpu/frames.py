@@ -12,7 +12,7 @@ from ..theses.experiments import DEPTHS, Effort, Experiment, experiments, measur
 from .request import Item, Request, Row
 
 EFFORT = Effort(seconds=1.0, rounds=50, depths=DEPTHS)
-QUICK = Effort(seconds=0.0, rounds=1, detail=1, smaller=64, part=1, depths=DEPTHS[:1])
+QUICK = Effort(seconds=0.0, rounds=1, detail=1, smaller=256, part=1, depths=DEPTHS[:1])
 
 
 def items(request: Request) -> Iterator[Item]:

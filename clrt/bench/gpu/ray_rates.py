@@ -26,7 +26,7 @@ from .request import Item, Request, Row
 from .small_scenes import smaller
 
 #: Subdivisions of the bumpy ball, and the side of the image that the camera rays form; with --quick.
-SUBDIVISIONS, LARGEST, QUICK_SUBDIVISIONS, QUICK_LARGEST = 7, 2048, 2, 16
+SUBDIVISIONS, LARGEST, QUICK_SUBDIVISIONS, QUICK_LARGEST = 7, 2048, 2, 8
 #: Sizes of work-groups: those of a device that vectorizes over work-items, and of one that does not.
 GROUPS, FEW_GROUPS = (32, 64, 128, 256), (1, 2, 4)
 #: Scenes whose paths are traced with each size of work-groups.

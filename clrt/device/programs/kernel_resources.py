@@ -12,7 +12,7 @@ import pyopencl as cl
 
 from ..open import Device
 from .compile_process import quietly_built
-from .program import OPTIONS, program_text
+from .program import build_options, program_text
 
 VERBOSE = "-cl-nv-verbose"
 NVIDIA = "NVIDIA CUDA"
@@ -27,7 +27,7 @@ FIGURES = {
 
 def kernel_resources(device: Device, source: str) -> dict[str, dict[str, int]]:
     """Compile the source, and return for each kernel what the driver reports."""
-    options = OPTIONS + [VERBOSE] * (device.info.platform == NVIDIA)
+    options = build_options(device) + [VERBOSE] * (device.info.platform == NVIDIA)
     program = quietly_built(cl.Program(device.context, program_text(device, source)), options)
     log = str(program.get_build_info(device.cl, cl.program_build_info.LOG))  # type: ignore[no-untyped-call]
     told, reported = registers_in(log), cl.kernel_work_group_info

@@ -157,6 +157,11 @@ def program_text(device: Device, source: str) -> str:
     return source if device.fuses else compose("", "core/fma.cl", {}) + source
 
 
+def build_options(device: Device) -> list[str]:
+    """Return the compiler options for the device."""
+    return OPTIONS + (SIMULATOR_OPTIONS if device.info.type == "simulator" else [])
+
+
 def program_key(device: Device, source: str) -> str:
     """Return the cache key of a program.
 
@@ -205,8 +210,7 @@ def _compile(device: Device, source: str) -> cl.Program:
     start, log = time.perf_counter(), "interrupted"
     program = cl.Program(device.context, source)
     try:
-        options = OPTIONS + (SIMULATOR_OPTIONS if device.info.type == "simulator" else [])
-        in_background(_where(device), lambda: quietly_built(program, options))
+        in_background(_where(device), lambda: quietly_built(program, build_options(device)))
         log = f"built in {time.perf_counter() - start:.2f} s\n{_build_log(device, program)}"
     except cl.Error as error:
         log = "\n".join(filter(None, [str(error).strip(), no_room()]))
