@@ -105,7 +105,8 @@ COLUMNS = {
         Column("rays", "rays", ","),
         Column("clrt, Mrays/s", "clrt_mrays", ".4g"),
         Column("Warp, Mrays/s", "warp_mrays", ".4g"),
-        MSAMPLES,
+        Column("clrt, Msamples/s", "clrt_msamples", ".4g"),
+        Column("Mitsuba, Msamples/s", "mitsuba_msamples", ".4g"),
         Column("mean", "mean", ".5g"),
     ],
 }

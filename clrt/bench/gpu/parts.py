@@ -18,14 +18,14 @@ class Part(NamedTuple):
 
 PARTS = {
     "device": Part("Device", 12, facts.items),
-    "hits": Part("Hits", 7, hits.items),
-    "images": Part("Images", 20, gallery.image_items),
-    "rays": Part("Rays", 16, ray_rates.layout_items),
+    "hits": Part("Hits", 14, hits.items),
+    "images": Part("Images", 22, gallery.image_items),
+    "rays": Part("Rays", 14, ray_rates.layout_items),
     "samples": Part("Samples", 20, gallery.speed_items),
-    "groups": Part("Work-group sizes", 8, ray_rates.group_items),
+    "groups": Part("Work-group sizes", 10, ray_rates.group_items),
     "builds": Part("BVH builds", 10, builds.items),
     "frames": Part("Frames", 10, frames.items),
     "calls": Part("Calls from Python", 2, calls.items),
-    "compiles": Part("Compile times", 8, compiles.items),
+    "compiles": Part("Compile times", 10, compiles.items),
     "peers": Part("Other renderers and libraries", 5, peers.items),
 }

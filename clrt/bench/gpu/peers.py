@@ -12,10 +12,12 @@ from ...device.discovery.discover import choose
 from ...errors import UsageError
 from ...formats.load_scene import load
 from ...queries.mesh import RayQuery
+from ...rendering.renderer import Renderer
 from ..rays.ray_libraries import Call, clrt, warp
 from ..rays.workloads import bumpy_ball, closed_room, workloads
 from ..renderers.mitsuba_renderer import Mitsuba, load as load_mitsuba
 from ..renderers.mitsuba_scene import mitsuba_scene
+from .gallery import steady_rate
 from .request import Item, Request, Row
 from .small_scenes import smaller
 
@@ -32,7 +34,7 @@ def items(request: Request) -> Iterator[Item]:
         yield Item(f"rays, {kind}", partial(_calls, kind, request, "cuda:0" if gpu else "cpu"))
     for file in map(Path, request.scenes):
         if file.stem in SCENES:
-            yield Item(f"Mitsuba, {file.stem}", partial(_mitsuba, file, request.quick, "cuda_ad_rgb" if gpu else None))
+            yield Item(f"Mitsuba, {file.stem}", partial(_mitsuba, file, request, "cuda_ad_rgb" if gpu else None))
 
 
 def _calls(name: str, request: Request, device: str) -> Row:
@@ -67,19 +69,22 @@ def _median_seconds(run: Callable[[], object]) -> float:
     return median(taken)
 
 
-def _mitsuba(file: Path, quick: bool, variant: str | None) -> Row:
+def _mitsuba(file: Path, request: Request, variant: str | None) -> Row:
+    """Return samples per second of Mitsuba and of clrt, in millions."""
     try:
         library, name = load_mitsuba(variant)
     except ImportError as error:
         raise UsageError("Mitsuba is not installed (pip install mitsuba)") from error
-    scene = smaller(load(file)) if quick else load(file)
-    renderer, spp = Mitsuba(library, mitsuba_scene(scene)), 1 if quick else SPP
+    scene = smaller(load(file)) if request.quick else load(file)
+    renderer, spp = Mitsuba(library, mitsuba_scene(scene)), 1 if request.quick else SPP
     image = min((renderer(spp, seed) for seed in range(2)), key=lambda image: image.seconds)
     width, height = scene.render.size
+    ours = Renderer(scene, device=request.device, spp=None, seed=1)
     return {
         "on": name,
         "spp": image.spp,
         "seconds": image.seconds,
-        "msamples": 1e-6 * image.spp * width * height / image.seconds,
+        "clrt_msamples": (steady_rate(ours, 0.0, 0.0) if request.quick else steady_rate(ours))["msamples"],
+        "mitsuba_msamples": 1e-6 * image.spp * width * height / image.seconds,
         "mean": float(image.pixels.mean()),
     }
