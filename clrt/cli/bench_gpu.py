@@ -8,12 +8,13 @@ from typing import Any
 
 import click
 
+from ..errors import OutputError
 from .bench_files import check_files
 from .option_types import Finite
 
 
 @click.command("gpu")
-@click.argument("scenes", nargs=-1, type=click.Path(path_type=Path), metavar="[SCENE...]")
+@click.argument("scenes", nargs=-1, type=click.Path(exists=True, path_type=Path), metavar="[SCENE...]")
 @click.option("--device", metavar="SEL", help="Device to measure; see `clrt devices`.")
 @click.option(
     "--minutes", type=Finite(0.0), default=8.0, show_default=True, help="Time for all parts; each gets its share."
@@ -39,7 +40,7 @@ def gpu_command(
     SCENE: instead of the gallery's scenes. Each part runs in a process of its own, so one that fails, hangs or crashes
     its driver is recorded, and the others follow. A second run completes what time did not suffice for.
     """
-    from ..bench.gpu.archive import read_archive, write_archive
+    from ..bench.gpu.archive import read_archive
     from ..bench.gpu.measure_gpu import begin, measure_gpu, resumed
     from ..bench.gpu.page import page_of
     from ..bench.gpu.shipped_scenes import shipped_scenes
@@ -56,14 +57,24 @@ def gpu_command(
             on_part=lambda part: _told(results, part, output),
         )
     finally:
-        write_archive(output, results, page_of(results))
+        _write(output, results, page_of(results))
     click.echo(str(output))
 
 
 def _told(results: Mapping[str, Any], part: str, output: Path) -> None:
     """Write the results so far, and print a line about a part."""
-    from ..bench.gpu.archive import write_archive
     from ..bench.gpu.summary import summary_line
 
-    write_archive(output, results)
+    _write(output, results)
     click.echo(summary_line(part, results["parts"][part]))
+
+
+def _write(output: Path, results: Mapping[str, Any], page: str | None = None) -> None:
+    """Write the results, if necessary to a fallback location, which the error then names."""
+    from ..bench.gpu.archive import write_archive
+    from .fallback import kept_elsewhere
+
+    try:
+        write_archive(output, results, page)
+    except OutputError as error:
+        raise kept_elsewhere(error, output, lambda other: write_archive(other, results, page)) from error

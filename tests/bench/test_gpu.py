@@ -78,6 +78,17 @@ def test_an_item_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert part.rows["c"]["error"] == "it did not finish in 2 s" and part.seconds < 15
 
 
+def test_what_a_hanging_item_started_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pid = tmp_path / "pid"
+    end = f"""import subprocess
+            with open({str(pid)!r}, "w") as file:
+                file.write(str(subprocess.Popen(["sleep", "100"]).pid))
+            time.sleep(100)"""
+    run(tmp_path, monkeypatch, CHILD.format(item="a", end=end), 3.0)
+    status = Path(f"/proc/{pid.read_text()}/stat")
+    assert not status.exists() or status.read_text().rpartition(")")[2].split()[0] == "Z"
+
+
 def test_a_part_whose_time_is_over_keeps_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     done, part = run(tmp_path, monkeypatch, CHILD.format(item="c", end="time.sleep(100)"), 2.0)
     assert not done and not part.failure and values(part) == {"a": "a", "b": "b"}

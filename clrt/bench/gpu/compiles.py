@@ -82,7 +82,7 @@ def compile_in_process(
     argument = json.dumps({"file": str(file), "device": device, "resources": resources, "paths": paths})
     caches = {} if cache is None else dict.fromkeys(CACHES, cache)
     with TemporaryFile() as output, TemporaryFile() as errors:
-        child = start_child(__name__, argument, output, errors, DEVNULL, **caches)
+        child = start_child(__name__, argument, output, errors, DEVNULL, False, **caches)
         try:
             code = child.wait(limit)
         except TimeoutExpired as error:

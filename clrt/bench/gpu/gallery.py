@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...device.open import open_device
 from ...formats.load_scene import load
 from ...output.images import read_image
-from ...rendering.compile.choices import Paths
+from ...rendering.compile.choices import Choices, Paths
 from ...rendering.renderer import Renderer
 from ...scene.model import Scene
 from .programs import compile_ahead
@@ -24,7 +24,7 @@ from .small_scenes import smaller
 #: Samples per pixel, and width in pixels, of images to compare; with --quick.
 SPP, WIDTH, QUICK_SPP, QUICK_WIDTH = 16, 512, 1, 16
 #: Seconds of rendering before the measurement, in which launches grow to their full size, and of the measurement.
-WARM_UP, MEASURED = 0.5, 1.0
+WARM_UP, MEASURED = 0.5, 0.8
 #: Pixels are near if they differ by less than this fraction; single paths may take another branch after rounding.
 NEAR = 1e-3
 
@@ -37,9 +37,10 @@ def image_items(request: Request) -> Iterator[Item]:
 
 
 def speed_items(request: Request) -> Iterator[Item]:
-    """Yield the scenes with each of `Paths`."""
-    for file in map(Path, request.scenes):
-        for paths in get_args(Paths):
+    """Yield the scenes with the device's own choice of `Paths`, then with each of the others."""
+    own = Choices().on(open_device(request.device)).paths
+    for paths in sorted(get_args(Paths), key=lambda paths: bool(paths != own)):
+        for file in map(Path, request.scenes):
             yield Item(f"{file.stem}, {paths}", partial(_speed, file, paths, request))
 
 

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from queue import Empty
 
 from ...awake import AwakeClock
-from ...device.programs.child_process import end_child, last_line, start_child, told_end
+from ...device.programs.child_process import end_group, last_line, start_child, told_end
 from ...device.programs.child_results import child_results
 from .request import Request, Row
 
@@ -57,7 +57,7 @@ class PartRun:
         self._item, self._began = "", self._clock.look()
         argument = {"part": self._name, "request": asdict(self._request), "done": list(self.rows)}
         with tempfile.TemporaryFile() as errors:
-            child = start_child(self._module, json.dumps(argument), subprocess.PIPE, errors)
+            child = start_child(self._module, json.dumps(argument), subprocess.PIPE, errors, own_group=True)
             try:
                 for told in child_results(child, self._is_over):
                     self._note(told)
@@ -68,7 +68,7 @@ class PartRun:
                 if self._clock.seconds - self._began >= self._longest:
                     self._record(f"it did not finish in {self._longest:.0f} s")
             finally:
-                end_child(child)
+                end_group(child)
         return False
 
     def _note(self, told: dict[str, Row | str]) -> None:
