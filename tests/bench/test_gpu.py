@@ -84,7 +84,7 @@ def test_what_a_hanging_item_started_is_ended(tmp_path: Path, monkeypatch: pytes
             with open({str(pid)!r}, "w") as file:
                 file.write(str(subprocess.Popen(["sleep", "100"]).pid))
             time.sleep(100)"""
-    run(tmp_path, monkeypatch, CHILD.format(item="a", end=end), 3.0)
+    run(tmp_path, monkeypatch, CHILD.format(item="a", end=end), 6.0)
     status = Path(f"/proc/{pid.read_text()}/stat")
     assert not status.exists() or status.read_text().rpartition(")")[2].split()[0] == "Z"
 
