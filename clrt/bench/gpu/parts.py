@@ -17,7 +17,7 @@ class Part(NamedTuple):
 
 
 PARTS = {
-    "device": Part("Device", 12, facts.items),
+    "device": Part("Device", 20, facts.items),
     "hits": Part("Hits", 14, hits.items),
     "images": Part("Images", 16, gallery.image_items),
     "rays": Part("Rays", 10, ray_rates.layout_items),

@@ -22,7 +22,10 @@ CHILD = f"{__package__}.part_process"
 
 
 class PartRun:
-    """Run of a part. rows: by item, which may have some from before; failure: why it ended before its last item."""
+    """Run of a part. rows: by item, which may have some from before; failure: why it ended before its last item.
+
+    An item that took too long is `late`: another run, on a machine that may be less busy, tries it again.
+    """
 
     def __init__(
         self,
@@ -33,16 +36,18 @@ class PartRun:
         module: str = CHILD,
     ) -> None:
         self.rows, self.failure = rows, ""
+        for item in [item for item, row in rows.items() if row.get("late")]:
+            del rows[item]
         self._name, self._request, self._on_item, self._module = name, request, on_item, module
         self._clock = AwakeClock()
         self._item, self._began = "", 0.0
 
     def run(self) -> bool:
-        """Measure the items that `rows` lacks; return whether no item is left."""
+        """Measure the items that `rows` lacks; return whether no item is left, nor late."""
         while self._clock.look() < self._request.seconds:
             before = len(self.rows)
             if self._run_child():
-                return True
+                return not any(row.get("late") for row in self.rows.values())
             if len(self.rows) == before:
                 return bool(self.failure)
         return False
@@ -66,7 +71,7 @@ class PartRun:
                 self._record(f"{told_end(child.returncode)}{last_line(errors)}")
             except (Empty, subprocess.TimeoutExpired):
                 if self._clock.seconds - self._began >= self._longest:
-                    self._record(f"it did not finish in {self._longest:.0f} s")
+                    self._record(f"it did not finish in {self._longest:.0f} s", late=True)
             finally:
                 end_group(child)
         return False
@@ -79,10 +84,10 @@ class PartRun:
             self.rows[self._item] = row | {"item_seconds": round(self._clock.look() - self._began, 2)}
             self._item, self._began = "", self._clock.look()
 
-    def _record(self, failure: str) -> None:
+    def _record(self, failure: str, late: bool = False) -> None:
         """Record the failure of the item in progress, or between items of the part itself."""
         if self._item:
-            self.rows[self._item] = {"error": failure}
+            self.rows[self._item] = {"error": failure, **({"late": True} if late else {})}
         else:
             self.failure = failure
 

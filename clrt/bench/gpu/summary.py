@@ -17,7 +17,7 @@ def summary_line(name: str, part: Mapping[str, Any]) -> str:
         if count := sum(key in row for row in part["rows"].values()):
             told.append(f"{count} {text}")
     if part["state"] != "done":
-        told.append(part.get("failure") or "more items than time")
+        told.append(part.get("failure") or "to be completed")
     return f"{PARTS[name].title}: {'; '.join(told) or 'nothing measured'} ({part['seconds']:.0f} s)"
 
 
