@@ -16,12 +16,13 @@ from subprocess import DEVNULL, TimeoutExpired
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any, get_args
 
+from ...device.device_info import Paths
 from ...device.open import open_device
 from ...device.programs.child_process import end_child, last_line, start_child, told_end
 from ...device.programs.kernel_resources import kernel_resources
 from ...errors import DeviceError
 from ...formats.load_scene import load
-from ...rendering.compile.choices import Choices, Paths
+from ...rendering.compile.choices import Choices
 from ...rendering.renderer import Renderer
 from .request import Item, Request, Row
 from .small_scenes import smaller

@@ -11,10 +11,11 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from ...device.device_info import Paths
 from ...device.open import open_device
 from ...formats.load_scene import load
 from ...output.images import read_image
-from ...rendering.compile.choices import Choices, Paths
+from ...rendering.compile.choices import Choices
 from ...rendering.renderer import Renderer
 from ...scene.model import Scene
 from .programs import compile_ahead

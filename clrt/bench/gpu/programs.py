@@ -9,8 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import get_args
 
+from ...device.device_info import Paths
 from ...errors import ClrtError
-from ...rendering.compile.choices import Paths
 from .compiles import compile_in_process
 from .request import Request, Row
 

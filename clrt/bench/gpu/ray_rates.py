@@ -12,10 +12,10 @@ from typing import get_args
 import numpy as np
 
 from ...accel.methods import TREELESS
+from ...device.device_info import Paths
 from ...device.open import Device, open_device
 from ...formats.load_scene import load
 from ...queries.mesh import RayQuery
-from ...rendering.compile.choices import Paths
 from ...rendering.renderer import Renderer
 from ..rays.device_speed import BUSY, MEASURED, busy_side, shortest_seconds
 from ..rays.layout_speed import CONTESTANTS
@@ -116,6 +116,11 @@ class GroupedDevice(Device):
     @property
     def local_size(self) -> int:
         """Return the work-group size."""
+        return self.group
+
+    @property
+    def group_size(self) -> int:
+        """Return that of the queues' kernels."""
         return self.group
 
     @staticmethod
