@@ -46,7 +46,7 @@ def kernel_resources(device: Device, source: str) -> dict[str, dict[str, int]]:
 def registers_in(log: str) -> dict[str, dict[str, int]]:
     """Return the FIGURES of each kernel in the log of NVIDIA's compiler, as far as it has them."""
     told: dict[str, dict[str, int]] = {}
-    for name, text in re.findall(r"Compiling entry function '(\w+)'(.*?)(?=Compiling entry|\Z)", log, re.DOTALL):
+    for name, text in re.findall(r"entry function '(\w+)'(.*?)(?=entry function|\Z)", log, re.DOTALL):
         found = {key: re.search(pattern, text) for key, pattern in FIGURES.items()}
         told[name] = {key: int(match[1]) for key, match in found.items() if match}
     return told
