@@ -14,7 +14,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from clrt.bench.gpu import hits, page, run_part
+from clrt.bench.gpu import hits, measure_gpu, page, run_part
 from clrt.bench.gpu.archive import read_archive, write_archive
 from clrt.bench.gpu.columns import COLUMNS, rows_of
 from clrt.bench.gpu.gallery import image_items, speed_items
@@ -131,6 +131,29 @@ def test_only_results_of_the_same_device_are_resumed() -> None:
     assert resumed(new, None, Path("a")) == new and resumed(new, before, Path("a")) == before
     with pytest.raises(UsageError, match="of another driver; choose another file, or replace them with --fresh"):
         resumed(new, {**before, "identity": {"device": "1", "driver": "3"}}, Path("a"))
+
+
+def test_parts_share_the_time_and_what_others_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every part takes all its time but the first, which takes none."""
+    given: dict[str, float] = {}
+
+    def fake(name: str, part: Row, request: Request, on_item: object) -> None:
+        time.sleep(request.seconds if given else 0)
+        given[name] = request.seconds
+
+    monkeypatch.setattr(measure_gpu, "_measure_part", fake)
+    monkeypatch.setattr(measure_gpu, "LEAST", 0.0)
+    results = {"parts": {"calls": {"state": "done"}}, "device": {"id": "0"}, "other": None, "identity": {"quick": True}}
+    start, seconds = time.monotonic(), 2.0
+    measure_gpu.measure_gpu(results, [], seconds)
+    assert list(given) == [name for name in PARTS if name != "calls"]
+    assert time.monotonic() - start == pytest.approx(seconds, abs=0.3)
+    first, *others = given
+    shares = {name: PARTS[name].share for name in given}
+    assert given[first] == pytest.approx(seconds * shares[first] / sum(shares.values()), rel=0.05)
+    for name in others:
+        expected = seconds * shares[name] / (sum(shares.values()) - shares[first])
+        assert given[name] == pytest.approx(expected, rel=0.3, abs=0.02)
 
 
 def test_differing_hits_are_counted() -> None:

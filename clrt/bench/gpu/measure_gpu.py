@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import platform
+import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ...awake import AwakeClock
 from ...device.device_info import DeviceInfo, identity_of
 from ...device.discovery.discover import as_dict, find_devices, select
 from ...device.open import POCL
@@ -79,10 +79,10 @@ def measure_gpu(
     seconds: for all parts, of which each gets its share of what is left. A part has `state`, `seconds`, `rows` by item
     (see parts.py), and `failure`, if it ended before its last item.
     """
-    clock = AwakeClock()
+    end = time.monotonic() + seconds
     rest = [name for name in PARTS if results["parts"].get(name, {}).get("state") != DONE]
     while rest:
-        left = max(0.0, seconds - clock.look())
+        left = max(0.0, end - time.monotonic())
         share = PARTS[rest[0]].share / sum(PARTS[name].share for name in rest)
         name = rest.pop(0)
         part = results["parts"].setdefault(name, {"state": UNFINISHED, "seconds": 0.0, "rows": {}})
