@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from subprocess import DEVNULL, TimeoutExpired
 from tempfile import TemporaryDirectory, TemporaryFile
-from typing import Any, get_args
+from typing import Any
 
 from ...device.device_info import Paths
 from ...device.open import open_device
@@ -24,6 +24,7 @@ from ...errors import DeviceError
 from ...formats.load_scene import load
 from ...rendering.compile.choices import Choices
 from ...rendering.renderer import Renderer
+from .executions import executions
 from .request import Item, Request, Row
 from .small_scenes import smaller
 
@@ -44,7 +45,7 @@ def items(request: Request) -> Iterator[Item]:
     """Yield some of the scenes with each of `Paths`."""
     files = {file.stem: file for file in map(Path, request.scenes)}
     chosen = [files[name] for name in SCENES if name in files] or list(files.values())
-    for paths in get_args(Paths):
+    for paths in executions(request.device):
         for file in chosen[: 1 if request.quick else None]:
             yield Item(f"{file.stem}, {paths}", partial(_compile, file, paths, request))
 

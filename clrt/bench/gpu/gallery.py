@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,9 @@ from ...device.device_info import Paths
 from ...device.open import open_device
 from ...formats.load_scene import load
 from ...output.images import read_image
-from ...rendering.compile.choices import Choices
 from ...rendering.renderer import Renderer
 from ...scene.model import Scene
+from .executions import executions
 from .programs import compile_ahead
 from .request import Item, Request, Row
 from .small_scenes import smaller
@@ -39,8 +38,7 @@ def image_items(request: Request) -> Iterator[Item]:
 
 def speed_items(request: Request) -> Iterator[Item]:
     """Yield the scenes with the device's own choice of `Paths`, then with each of the others."""
-    own = Choices().on(open_device(request.device)).paths
-    for paths in sorted(get_args(Paths), key=lambda paths: bool(paths != own)):
+    for paths in executions(request.device):
         for file in map(Path, request.scenes):
             yield Item(f"{file.stem}, {paths}", partial(_speed, file, paths, request))
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from statistics import median
-from typing import get_args
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from ..rays.device_speed import BUSY, MEASURED, busy_side, shortest_seconds
 from ..rays.layout_speed import CONTESTANTS
 from ..rays.ray_speed import Run, every
 from ..rays.workloads import Workload, bumpy_ball, closed_room, workloads
+from .executions import executions
 from .gallery import steady_rate
 from .request import Item, Request, Row
 from .small_scenes import smaller
@@ -138,7 +138,7 @@ def group_items(request: Request) -> Iterator[Item]:
         for kind in KINDS[:2]:
             yield Item(f"{kind}, {group}", partial(_group_rate, rays, kind, group, request.quick))
     for file in map(Path, request.scenes):
-        for paths in get_args(Paths) if file.stem in GROUP_SCENES else ():
+        for paths in executions(request.device) if file.stem in GROUP_SCENES else ():
             for group in groups:
                 measure = partial(_group_paths, file, paths, device, group, request.quick)
                 yield Item(f"{file.stem}, {paths}, {group}", measure)
