@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from math import prod
 from pathlib import Path
+
+from clrt.device.launches.data_parallel import SCAN_ITEMS
+from clrt.scene.materials.material_types import MATERIALS
 
 KERNELS = Path(__file__).parents[1] / "kernels"
 TEXTS = {str(path.relative_to(KERNELS)): path.read_text(encoding="utf-8") for path in KERNELS.rglob("*.cl")}
@@ -54,3 +58,37 @@ def test_arrays_of_the_scene_may_be_in_parts() -> None:
 def test_direct_access_is_found() -> None:
     text = "scene->nodes[3].x + scene->counts.lights + scene->sky->width + RECORD(scene->packs, i)->p0 + (scene->a + 1)"
     assert DIRECT.findall(text) == ["nodes", "sky", "a"]
+
+
+#: Least local memory of OpenCL 1.2's full profile, and all that Apple's GPUs have.
+MOST_LOCAL = 32 << 10
+LOCAL = re.compile(r"\blocal (?:const )?([a-z]+)(\d*) \w+\[([\w *]+)\]")
+BYTES = {"uchar": 1, "char": 1, "ushort": 2, "short": 2, "uint": 4, "int": 4, "float": 4, "ulong": 8, "long": 8}
+
+
+def local_bytes(text: str, values: dict[str, int]) -> int:
+    """Return the local memory of all arrays of a file; values: of names that a program defines."""
+    return sum(
+        BYTES[kind] * (4 if width == "3" else int(width or 1)) * prod(_value(each, values) for each in count.split("*"))
+        for kind, width, count in LOCAL.findall(re.sub(r"//.*", "", text))
+    )
+
+
+def _value(factor: str, values: dict[str, int]) -> int:
+    return int(factor) if factor.strip().isdigit() else values[factor.strip()]
+
+
+def test_kernels_need_no_more_local_memory_than_every_device_has() -> None:
+    """The limit is that of a kernel; no file exceeds it with those of all its kernels."""
+    sizes = {
+        file: local_bytes(text, {"SCAN_ITEMS": SCAN_ITEMS, "KINDS": 1 + len(MATERIALS)}) for file, text in TEXTS.items()
+    }
+    assert {file for file, size in sizes.items() if size > MOST_LOCAL} == set()
+    assert {"build/scan.cl", "build/ploc.cl"} <= {file for file, size in sizes.items() if size}
+    declared = {file for file, text in TEXTS.items() if re.search(r"^\s+(?:__)?local(?: \w+)+ \w+\b", text, re.M)}
+    assert declared == {file for file, size in sizes.items() if size}, "of a form that is not counted"
+
+
+def test_local_memory_is_counted() -> None:
+    text = "    local uint2 a[N];\n    local float b[3]; // local float c[9];\n    local float3 d[2 * N];"
+    assert local_bytes(text, {"N": 5}) == 5 * 8 + 3 * 4 + 2 * 5 * 16

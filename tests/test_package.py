@@ -13,10 +13,10 @@ import clrt
 ROOT = Path(__file__).parent.parent
 
 
-def test_wheel_holds_every_module_and_kernel(tmp_path: Path) -> None:
+def test_wheel_holds_every_module_kernel_and_scene(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.mkdir()
-    for name in ("setup.cfg", "pyproject.toml", "README.md", "LICENSE", "clrt", "kernels"):
+    for name in ("setup.cfg", "pyproject.toml", "README.md", "LICENSE", "clrt", "kernels", "scenes"):
         subprocess.run(["cp", "-r", ROOT / name, source], check=True)
     subprocess.run(
         [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path, source],
@@ -27,7 +27,7 @@ def test_wheel_holds_every_module_and_kernel(tmp_path: Path) -> None:
     packed = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     modules = {
         str(file.relative_to(ROOT))
-        for pattern in ("*.py", "*.c", "py.typed")
+        for pattern in ("*.py", "*.c", "*.json", "py.typed")
         for file in (ROOT / "clrt").rglob(pattern)
     }
     kernels = {
@@ -35,7 +35,12 @@ def test_wheel_holds_every_module_and_kernel(tmp_path: Path) -> None:
         for pattern in ("*.cl", "__init__.py")
         for file in (ROOT / "kernels").rglob(pattern)
     }
-    assert packed == modules | kernels
+    scenes = {
+        f"clrt/{file.relative_to(ROOT)}"
+        for file in (ROOT / "scenes").rglob("*")
+        if file.is_file() and file.suffix not in (".md", ".py")
+    }
+    assert packed == modules | kernels | scenes
 
 
 def test_version_is_the_package_s() -> None:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import UTC, datetime
-from queue import Empty, SimpleQueue
-from typing import IO, Any
+from queue import Empty
 
 from ..awake import AwakeClock
 from ..device.device_info import DeviceInfo, Verdict
 from ..device.programs.child_process import end_child, last_line, start_child, told_end
+from ..device.programs.child_results import child_results
 from ..device.programs.kernel_files import kernel_digest
 from ..errors import DeviceError
-from ..threads import BEAT, beside
 
 #: Time limit in seconds that suffices for any device that responds: exceeding a lower one is not a failure.
 LIMIT = 300.0
@@ -31,7 +29,7 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
     with tempfile.TemporaryFile() as errors:
         child = start_child(f"{__package__}.check_process", info.id, subprocess.PIPE, errors)
         try:
-            for told in _told(child, clock, limit):
+            for told in child_results(child, lambda: clock.look() >= limit):
                 if "begins" in told:
                     part = told["begins"]
                     on_part(part)
@@ -51,27 +49,3 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
             end_child(child)
     when = datetime.now(UTC).isoformat(timespec="seconds")
     return Verdict(not failures, failures, when, round(clock.seconds, 1), kernels, figures)
-
-
-def _told(child: subprocess.Popen[str], clock: AwakeClock, limit: float) -> Iterator[dict[str, Any]]:
-    """Yield the child's results until it ends. Raises Empty at the limit, and never waits for a process that hangs."""
-    lines: SimpleQueue[str] = SimpleQueue()
-
-    assert child.stdout is not None
-    output: IO[str] = child.stdout
-
-    def listen() -> None:
-        for line in output:
-            lines.put(line)
-        lines.put("")
-
-    beside(listen, daemon=True)
-    while clock.look() < limit:
-        try:
-            line = lines.get(timeout=min(BEAT, limit))
-        except Empty:
-            continue
-        if not line.endswith("\n"):
-            return
-        yield json.loads(line)
-    raise Empty

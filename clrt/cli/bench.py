@@ -11,6 +11,7 @@ from .bench_combinations import combinations_command
 from .bench_converge import converge_command
 from .bench_farm import farm_command
 from .bench_floor import floor_command
+from .bench_gpu import gpu_command
 from .bench_hits import hits_command
 from .bench_load import load_command
 from .bench_mitsuba_data import mitsuba_data_command
@@ -26,7 +27,7 @@ from .command_group import CommandGroup
 @click.group(cls=CommandGroup)
 def command() -> None:
     """Measure speed and accuracy: rays, build, hits, peers, load, converge, agree, combinations, floor,
-    blender, poses, mitsuba-data, render-fidelity, numerics, theses, farm."""
+    blender, poses, mitsuba-data, render-fidelity, numerics, theses, farm, gpu."""
 
 
 for each in (
@@ -46,5 +47,6 @@ for each in (
     numerics_command,
     theses_command,
     farm_command,
+    gpu_command,
 ):
     command.add_command(each)

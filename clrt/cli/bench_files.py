@@ -14,7 +14,7 @@ from ..errors import OutputError, UsageError
 from .fallback import kept_elsewhere
 
 #: Parameters that name output files, with their options; parameters that name folders for images.
-FILES = {"json_file": "--json", "plot": "--plot"}
+FILES = {"json_file": "--json", "plot": "--plot", "output": "--output"}
 FOLDERS = ("pictures", "keep")
 
 
@@ -24,7 +24,7 @@ def figures_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def checked(force: bool, **given: Any) -> None:
-        _check(given, force)
+        check_files(given, force)
         command(**given)
 
     for option in (
@@ -57,7 +57,7 @@ def write_figures(path: Path | None, figures: Mapping[str, Any]) -> None:
     click.echo(str(path))
 
 
-def _check(given: Mapping[str, Any], force: bool) -> None:
+def check_files(given: Mapping[str, Any], force: bool) -> None:
     from ..output.atomic_files import check_target, check_unprotected, make_folder
     from ..output.error_plots import check_plot
 

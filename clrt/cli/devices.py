@@ -133,6 +133,7 @@ def _lines(info: DeviceInfo) -> Iterator[str]:
         )
     yield from (f"     {place}" for place in info.hardware)
     yield f"     {'usable' if info.usable else 'not usable'}: {info.why}"
+    yield from (f"     known fault of this driver: {fault}" for fault in info.known_faults)
     if info.bench:
         yield (
             f"     Mrays/s: {info.bench.mrays_primary:.3g} primary, {info.bench.mrays_bounce:.3g} bounce, "

@@ -63,7 +63,8 @@ class DeviceInfo:
 
     id: stable until the platform or driver changes. why: a remark, or the reason why it cannot be used and the remedy.
     check, bench, tuning: the result of its last check, its measured speed, and how it renders fastest; None if that is
-    not known in its present state. hardware: its UUID and PCI address if its driver reports them.
+    not known in its present state. hardware: its UUID and PCI address if its driver reports them. known_faults: of its
+    driver's version, as others reported them (discovery/known_faults.json).
     """
 
     index: int
@@ -83,6 +84,7 @@ class DeviceInfo:
     bench: Speed | None = None
     tuning: Tuning | None = None
     hardware: tuple[str, ...] = ()
+    known_faults: tuple[str, ...] = ()
 
     @property
     def failed(self) -> bool:

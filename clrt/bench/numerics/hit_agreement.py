@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -63,12 +64,15 @@ def measure_hits(*, quick: bool = False, device: str | int | None = None) -> Ite
         else [info.index for info, _ in find_devices() if info.usable and info.type != "simulator"]
     )
     effort = QUICK if quick else FULL
-    for case in (
-        Case("icosphere", icosphere(effort.subdivisions), True),
-        Case("bumpy ball", bumpy_ball(effort.subdivisions), True),
-        Case("soup", soup(effort.soup), False),
-    ):
+    for case in cases(effort):
         yield measure_case(case, devices, effort)
+
+
+def cases(effort: Effort) -> Iterator[Case]:
+    """Yield the meshes of this extent."""
+    yield Case("icosphere", icosphere(effort.subdivisions), True)
+    yield Case("bumpy ball", bumpy_ball(effort.subdivisions), True)
+    yield Case("soup", soup(effort.soup), False)
 
 
 def measure_case(case: Case, devices: list[int], effort: Effort) -> dict[str, Any]:
@@ -77,7 +81,8 @@ def measure_case(case: Case, devices: list[int], effort: Effort) -> dict[str, An
     ways: for each configuration the number of rays (`rays`), and by kind (`differ`) for how many of them t, primitive,
     u and v are not bitwise equal to the first configuration's, or any_hit contradicts them; or the `error` that
     occurred. exact: how many of the first configuration's hits were compared with float64 (`rays`), how many of these
-    have a single possible result (`decided`), and how many are impossible (`wrong`).
+    have a single possible result (`decided`), and how many are impossible (`wrong`). digests: SHA-256 of the rays and
+    of the first configuration's hits, to compare with another machine's.
     """
     kinds = rays_of_kinds(*case.mesh, effort.rays)
     rays, triangles = all_rays(kinds), len(case.mesh[1])
@@ -103,6 +108,7 @@ def measure_case(case: Case, devices: list[int], effort: Effort) -> dict[str, An
             "exact": _checked(case.mesh, rays, first, -(-len(names) * triangles // effort.exact_tests)),
             "escaped": int(np.sum(inside & (first["primitive"] < 0))) if case.closed else None,
             "flat": int(np.sum(_on_flat(case.mesh, first))),
+            "digests": {"rays": _digest(*case.mesh, *rays), "hits": _digest(first)},
         }
     return result
 
@@ -130,6 +136,13 @@ def _checked(mesh: Mesh, rays: Rays, hits: NDArray[Any], step: int) -> dict[str,
         "decided": int(np.sum(bounds.primitive != UNDECIDED)),
         "wrong": int(np.sum(bounds.wrong(some, found) & ~_on_flat(mesh, found))),
     }
+
+
+def _digest(*arrays: NDArray[Any]) -> str:
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def _on_flat(mesh: Mesh, hits: NDArray[Any]) -> NDArray[np.bool_]:

@@ -19,7 +19,7 @@ from ...device.programs.child_process import end_child, last_line, start_child, 
 from ...errors import DeviceError
 from ...queries.mesh import RayQuery
 from .ray_speed import Run
-from .workloads import Workload, bumpy_ball, closed_room, workloads
+from .workloads import Mesh, Workload, bumpy_ball, closed_room, workloads
 
 KINDS = ("primary", "bounce", "shadow")
 SUBDIVISIONS = 6
@@ -50,14 +50,25 @@ def measure(device: str) -> Speed:
     ball = bumpy_ball(SUBDIVISIONS)
     room = closed_room(*ball)
     query = RayQuery(*room, device=device)
-    side = SMALLEST
-    while side < LARGEST and _seconds(query, next(workloads(*room, ball[0], query.closest_hit, (side, side)))) < BUSY:
-        side *= 2
+    side = busy_side(query, room, ball)
     kinds = [kind for kind in workloads(*room, ball[0], query.closest_hit, (side, side)) if kind.name in KINDS]
-    return Speed(**{f"mrays_{kind.name}": len(kind.rays[2]) / _seconds(query, kind, MEASURED) / 1e6 for kind in kinds})
+    return Speed(
+        **{f"mrays_{kind.name}": len(kind.rays[2]) / shortest_seconds(query, kind, MEASURED) / 1e6 for kind in kinds}
+    )
 
 
-def _seconds(query: RayQuery, kind: Workload, budget: float = 0.0) -> float:
+def busy_side(query: RayQuery, room: Mesh, target: Mesh, largest: int = LARGEST) -> int:
+    """Return the side in pixels of a square image whose primary rays keep the device busy, at most `largest`."""
+    side = min(SMALLEST, largest)
+    while side < largest:
+        primary = next(workloads(*room, target[0], query.closest_hit, (side, side)))
+        if shortest_seconds(query, primary) >= BUSY:
+            break
+        side *= 2
+    return side
+
+
+def shortest_seconds(query: RayQuery, kind: Workload, budget: float = 0.0) -> float:
     """Return the shortest kernel time for these rays within `budget` seconds, after a warm-up run."""
     run = Run(query, query.any_hit if kind.any_hit else query.closest_hit, kind.rays)
     end = time.perf_counter() + budget

@@ -76,11 +76,11 @@ def open3d(vertices: Floats, faces: Faces) -> Call:
     return call
 
 
-def warp(vertices: Floats, faces: Faces) -> Call:
-    """Prepare NVIDIA's Warp on the CPU: a kernel over its Mesh; single-threaded."""
+def warp(vertices: Floats, faces: Faces, device: str = "cpu") -> Call:
+    """Prepare NVIDIA's Warp: a kernel over its Mesh; on a CPU it is single-threaded. device: "cpu" or "cuda:0"."""
     library = import_module("warp")
     library.config.log_level = library.LOG_ERROR
-    vector, device = library.vec3, "cpu"
+    vector = library.vec3
 
     def closest_hit(mesh: Any, origins: Any, directions: Any, primitives: Any, ts: Any) -> None:
         i = library.tid()

@@ -67,12 +67,12 @@ def newest_llvm(root: Path = Path("/")) -> tuple[int, Path | None]:
     return max(found.items(), default=(0, None))
 
 
-def load() -> tuple[Any, str]:
-    """Return the module with its variant chosen, and a name: parallel with LLVM, otherwise scalar."""
+def load(variant: str | None = None) -> tuple[Any, str]:
+    """Return the module with its variant chosen, and a name; by default parallel with LLVM, otherwise scalar."""
     version, file = newest_llvm()
     if version >= OLDEST_LLVM:
         os.environ.setdefault(LLVM_VARIABLE, str(file))
-    variant = "llvm_ad_rgb" if LLVM_VARIABLE in os.environ else "scalar_rgb"
+    variant = variant or ("llvm_ad_rgb" if LLVM_VARIABLE in os.environ else "scalar_rgb")
     library = import_module("mitsuba")
     library.set_variant(variant)
     library.set_log_level(library.LogLevel.Error)

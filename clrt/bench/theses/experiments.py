@@ -188,22 +188,33 @@ def measure_theses(
     device: str | int | None = None,
     say: Callable[[str], None] = lambda message: None,
 ) -> Iterator[dict[str, Any]]:
-    """Yield the results of `clrt bench theses`, experiment by experiment.
+    """Yield the results of `clrt bench theses`, experiment by experiment: see `measure_experiment`."""
+    for experiment in experiments(effort, models):
+        yield measure_experiment(experiment, effort, device=device, say=say)
+
+
+def measure_experiment(
+    experiment: Experiment,
+    effort: Effort,
+    *,
+    device: str | int | None = None,
+    say: Callable[[str], None] = lambda message: None,
+) -> dict[str, Any]:
+    """Return the results of an experiment.
 
     name, title, thesis, machine (theirs), device, device_type, platform; triangles, size; rows: for each variant
     `seconds` per frame, the median, `cpu_seconds` and `mean`, `frames` measured, `frames_per_second`, `rays` and
     `samples` per frame, `theirs` (seconds), `part`, `depth` and `layout`; ratios: `of`, `over`, `ours`, `cpu` (of
     processor time), `theirs`. say: called with what is being rendered. Raises what `Renderer` raises.
     """
-    for experiment in experiments(effort, models):
-        renderers: dict[str, Renderer] = {}
-        runs = {}
-        for variant in experiment.variants:
-            say(f"{experiment.name}: {variant.name}")
-            if variant.shared not in renderers:
-                renderers[variant.shared] = _renderer(variant, experiment.variants, device)
-            runs[variant.name] = Run(variant, renderers[variant.shared])
-        yield _figures(experiment, runs, _take_turns(runs, effort))
+    renderers: dict[str, Renderer] = {}
+    runs = {}
+    for variant in experiment.variants:
+        say(f"{experiment.name}: {variant.name}")
+        if variant.shared not in renderers:
+            renderers[variant.shared] = _renderer(variant, experiment.variants, device)
+        runs[variant.name] = Run(variant, renderers[variant.shared])
+    return _figures(experiment, runs, _take_turns(runs, effort))
 
 
 def _renderer(variant: Variant, variants: Sequence[Variant], device: str | int | None) -> Renderer:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Collection
 from dataclasses import replace
 
@@ -13,7 +14,10 @@ from ..device_info import DeviceInfo
 from ..pocl.linker import lacks_linker
 from .drivers import Driver
 from .hardware_id import hardware
+from .known_faults import known_faults
 
+#: Environment variable with the Mesa drivers whose devices rusticl shows.
+RUSTICL_VARIABLE = "RUSTICL_ENABLE"
 MINIMUM_ALLOCATION = 16 << 20
 
 
@@ -37,6 +41,7 @@ def describe(device: cl.Device, index: int = 0) -> DeviceInfo:
         why=reason,
         chosen=False,
         hardware=places,
+        known_faults=known_faults(platform.name, device.driver_version),
     )
 
 
@@ -52,11 +57,28 @@ def describe_empty(platform: cl.Platform) -> DeviceInfo:
         _nothing(
             platform.name.strip(),
             platform.version,
-            "it has no device: is the hardware present, may "
-            "you use it (groups video and render), does the driver need an environment variable? If "
-            "you do not need it, remove it",
+            f"it has no device: {_remedy(platform.name.strip())} If you do not need it, remove it",
         ),
         platform_version=platform.version.strip(),
+    )
+
+
+def _remedy(platform: str) -> str:
+    """Return what to do about a platform without devices."""
+    enabled, access = (
+        os.environ.get(RUSTICL_VARIABLE),
+        "is the hardware present, may you use it (groups video and render)",
+    )
+    if platform.lower() != "rusticl":
+        return f"{access}, does the driver need an environment variable?"
+    if not enabled:
+        return (
+            f"it shows only those of the Mesa drivers that the variable {RUSTICL_VARIABLE} names. Set it to radeonsi "
+            "for AMD, iris for Intel, nouveau for NVIDIA or llvmpipe for the processor."
+        )
+    return (
+        f"{RUSTICL_VARIABLE} is {enabled!r}. Is that the hardware's Mesa driver, {access}, and is libclc installed, "
+        "which compiles for it?"
     )
 
 

@@ -28,6 +28,8 @@ from .user_preference import Preference, preferred_device
 
 log = logging.getLogger(__name__)
 ORDER = ("gpu", "accelerator", "cpu", "simulator", "none")
+#: Fields that not every device has.
+OPTIONAL = ("check", "bench", "tuning", "hardware", "known_faults")
 Found = list[tuple[DeviceInfo, cl.Device | None]]
 
 
@@ -59,9 +61,8 @@ def devices() -> list[dict[str, Any]]:
 
 
 def as_dict(info: DeviceInfo) -> dict[str, Any]:
-    """Return the fields of a device; `check`, `bench`, `tuning` and `hardware` only if they are known."""
-    known = ("check", "bench", "tuning", "hardware")
-    return {name: value for name, value in asdict(info).items() if value or name not in known}
+    """Return the fields of a device; those of OPTIONAL only if they are known."""
+    return {name: value for name, value in asdict(info).items() if value or name not in OPTIONAL}
 
 
 def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:

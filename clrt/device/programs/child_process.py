@@ -17,11 +17,13 @@ def start_child(
     output: IO[bytes] | int,
     errors: IO[bytes] | int,
     given: IO[bytes] | int = subprocess.DEVNULL,
+    own_group: bool = False,
     **variables: str,
 ) -> subprocess.Popen[str]:
     """Start `python -m module argument` with this process's module search path, wherever it is started.
 
-    given: its standard input. `variables` are added to its environment.
+    given: its standard input; own_group: whether `end_group` can end it with the processes that it starts. `variables`
+    are added to its environment.
     """
     path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
     environment = {**os.environ, "PYTHONPATH": path, **variables}
@@ -33,6 +35,7 @@ def start_child(
         text=True,
         encoding="utf-8",
         env=environment,
+        start_new_session=own_group,
     )
 
 
@@ -41,6 +44,14 @@ def end_child(child: subprocess.Popen[str]) -> None:
     child.kill()
     with suppress(subprocess.TimeoutExpired):
         child.wait(1.0)
+
+
+def end_group(child: subprocess.Popen[str]) -> None:
+    """Kill a child that has its own group, with all processes that it started; on Windows only the child."""
+    if sys.platform != "win32":
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(child.pid, signal.SIGKILL)
+    end_child(child)
 
 
 def activity(child: subprocess.Popen[str]) -> tuple[float, bool]:

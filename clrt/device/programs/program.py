@@ -95,7 +95,7 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
     program's data; for large data PoCL's front end runs in the compile process (compile_process.py).
     """
     start = time.perf_counter()
-    source = _whole(device, source)
+    source = program_text(device, source)
     key, programs = program_key(device, source), device.shared.programs
     ending = _ending(device, key)
     program = programs.pop(key, None)
@@ -121,7 +121,7 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
 
 def is_kept(device: Device, source: str) -> bool:
     """Return whether `build` would find the program in memory or the cache."""
-    key = program_key(device, _whole(device, source))
+    key = program_key(device, program_text(device, source))
     return key in device.shared.programs or read_binary(key) is not None
 
 
@@ -129,7 +129,7 @@ def compile_ahead(device: Device, source: str) -> None:
     """Compile in the compile process what `build` will soon need (PoCL only), and wait for it."""
     if is_kept(device, source) or not can_keep() or os.environ.get("POCL_KERNEL_CACHE") == "0":
         return
-    whole = _whole(device, source)
+    whole = program_text(device, source)
     key, done = program_key(device, whole), Event()
     device.shared.ahead[key] = done
     try:
@@ -152,6 +152,16 @@ def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
         raise KernelError(f"{_where(device)} cannot create kernel {name}: {error}") from error
 
 
+def program_text(device: Device, source: str) -> str:
+    """Return the source, preceded by functions that the device lacks."""
+    return source if device.fuses else compose("", "core/fma.cl", {}) + source
+
+
+def build_options(device: Device) -> list[str]:
+    """Return the compiler options for the device."""
+    return OPTIONS + (SIMULATOR_OPTIONS if device.info.type == "simulator" else [])
+
+
 def program_key(device: Device, source: str) -> str:
     """Return the cache key of a program.
 
@@ -166,11 +176,6 @@ def program_key(device: Device, source: str) -> str:
         best_processor(processor_flags()),
     ]
     return hashlib.sha256("\n".join(identity).encode()).hexdigest()
-
-
-def _whole(device: Device, source: str) -> str:
-    """Return the source, preceded by functions that the device lacks."""
-    return source if device.fuses else compose("", "core/fma.cl", {}) + source
 
 
 def _ending(device: Device, key: str) -> str:
@@ -205,8 +210,7 @@ def _compile(device: Device, source: str) -> cl.Program:
     start, log = time.perf_counter(), "interrupted"
     program = cl.Program(device.context, source)
     try:
-        options = OPTIONS + (SIMULATOR_OPTIONS if device.info.type == "simulator" else [])
-        in_background(_where(device), lambda: quietly_built(program, options))
+        in_background(_where(device), lambda: quietly_built(program, build_options(device)))
         log = f"built in {time.perf_counter() - start:.2f} s\n{_build_log(device, program)}"
     except cl.Error as error:
         log = "\n".join(filter(None, [str(error).strip(), no_room()]))

@@ -1,0 +1,1 @@
+"""A device measured from end to end: correctness, speed of every variant, builds, frames and compile times."""
