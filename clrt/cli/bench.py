@@ -19,6 +19,7 @@ from .bench_peers import peers_command
 from .bench_poses import poses_command
 from .bench_rays import rays_command
 from .bench_render_fidelity import render_fidelity_command
+from .bench_simt import simt_command
 from .bench_theses import theses_command
 from .command_group import CommandGroup
 
@@ -26,7 +27,7 @@ from .command_group import CommandGroup
 @click.group(cls=CommandGroup)
 def command() -> None:
     """Measure speed and accuracy: rays, build, hits, peers, load, converge, agree, combinations, floor,
-    blender, poses, mitsuba-data, render-fidelity, numerics, theses, farm."""
+    blender, poses, mitsuba-data, render-fidelity, numerics, theses, simt, farm."""
 
 
 for each in (
@@ -45,6 +46,7 @@ for each in (
     render_fidelity_command,
     numerics_command,
     theses_command,
+    simt_command,
     farm_command,
 ):
     command.add_command(each)

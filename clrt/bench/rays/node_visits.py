@@ -11,9 +11,7 @@ from ...queries.base import TreeQuery
 from .ray_speed import Rays
 
 #: Counts by what is visited (kernels/traverse/visits.cl).
-VISITS = record(
-    nodes="u4", leaves="u4", tests="u4", spheres="u4", instances="u4", closest="u4", blocked="u4", pad="u4"
-)
+VISITS = record(nodes="u4", leaves="u4", tests="u4", spheres="u4", instances="u4", closest="u4", blocked="u4", pad="u4")
 
 
 class _Counting(TreeQuery):
