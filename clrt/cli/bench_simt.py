@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .bench_files import figures_options, write_figures
+
+if TYPE_CHECKING:
+    from ..bench.simt.study import Effort
+    from ..bench.simt.workloads import Sample
+    from ..device.open import Device
+    from ..scene.model import Scene
 
 
 @click.command("simt")
@@ -22,6 +29,7 @@ from .bench_files import figures_options, write_figures
 )
 @click.option("--registers", type=click.IntRange(1, 255), help="Registers of the scene's megakernel; default: known.")
 @click.option("--instructions", type=click.IntRange(min=1), help="Instructions of the same; default: known.")
+@click.option("--shade", type=click.IntRange(min=1), help="Instructions of the queues' shading; default: known.")
 @click.option("--device", metavar="SEL", help="Device that records the rays; see `clrt devices`.")
 @click.option("--quick", is_flag=True, help="Use smaller samples of the rays and paths.")
 @figures_options
@@ -30,6 +38,7 @@ def simt_command(
     files: tuple[Path, ...],
     registers: int | None,
     instructions: int | None,
+    shade: int | None,
     device: str | None,
     quick: bool,
     json_file: Path | None,
@@ -52,12 +61,19 @@ def simt_command(
 
     if plot is not None and not files:
         raise UsageError("--plot draws the warps of scenes: add --scene FILE")
-    opened, effort = open_device(device), QUICK if quick else Effort()
     loaded = {file.stem: load(file) for file in files}
+    if len(loaded) < len(files):
+        raise UsageError("scenes are told apart by their files' names, of which two are equal; rename one")
+    opened, effort = open_device(device), QUICK if quick else Effort()
     queries, scenes = Queries(opened, effort), {}
     results: dict[str, Any] = {"quick": quick, "scenes": {}}
-    for name, scene in loaded.items():
-        scenes[name], results["scenes"][name] = _scene(name, scene, opened, effort, registers, instructions)
+    for file, (name, scene) in zip(files, loaded.items()):
+        try:
+            scenes[name], results["scenes"][name] = _scene(
+                name, scene, opened, effort, (registers, instructions, shade)
+            )
+        except UsageError as error:
+            raise UsageError(f"{file}: {error}") from error
         click.echo("\n".join(_scene_lines(name, results["scenes"][name])))
     rates = predicted_queries(queries, GPUS, effort.largest)
     results |= {"queries": rates, "published": PUBLISHED, "errors": errors_at([*queries.points(), *points_of(scenes)])}
@@ -73,19 +89,21 @@ def simt_command(
 
 
 def _scene(
-    name: str, scene: Any, device: Any, effort: Any, registers: int | None, instructions: int | None
-) -> tuple[dict[str, Any], dict[str, Any]]:
+    name: str, scene: Scene, device: Device, effort: Effort, compiled: tuple[int | None, int | None, int | None]
+) -> tuple[dict[str, Sample], dict[str, Any]]:
     """Return a scene's samples by layout, and its results."""
     from ..bench.simt.gpus import GPUS
-    from ..bench.simt.study import USUAL, groups_of, orders_of, predicted_scene, program_of, sampled_scene, warps_of
+    from ..bench.simt.measured import measured_programs
+    from ..bench.simt.study import USUAL, groups_of, orders_of, predicted_scene, sampled_scene, warps_of
     from ..bench.simt.variants import Program
 
-    known = program_of(name) or USUAL
-    program = Program(registers or known.registers, instructions or known.instructions)
+    known = measured_programs().get(name, USUAL)
+    registers, instructions, shade = compiled
+    program = Program(registers or known.registers, instructions or known.instructions, shade or known.shade)
     samples = sampled_scene(device, scene, effort)
     sample = samples["cwbvh"]
     return samples, {
-        "program": {"registers": program.registers, "instructions": program.instructions},
+        "program": asdict(program),
         "paths": sample.visits.paths,
         "rays": sample.visits.rays,
         "warps": {layout: warps_of(each, layout) for layout, each in samples.items()},
@@ -99,7 +117,7 @@ def _scene_lines(name: str, result: Mapping[str, Any]) -> Iterator[str]:
     program = result["program"]
     yield (
         f"{name}: {result['paths']} paths, {result['rays']} rays; "
-        f"{program['registers']} registers, {program['instructions']} instructions"
+        f"{program['registers']} registers, {program['instructions']} instructions, {program['shade']} to shade"
     )
     yield f"  {'lanes at work, of 32':28}{'extend':>9}{'shade':>9}{'connect':>9}{'lines per node':>18}{'misses':>9}"
     for layout, variants in result["warps"].items():
@@ -147,6 +165,6 @@ def _error_lines(errors: Mapping[str, Any]) -> Iterator[str]:
             f"  {row['gpu'] + ': ' + row['point']:60}{1e-6 * row['measured']:14.4g}{1e-6 * row['modelled']:10.4g}"
             f"{row['modelled'] / row['measured']:8.2f}{row['left_out']:10.2f}"
         )
-    for kind, factor in errors["factor"].items():
-        yield f"  {kind}: within a factor of {factor:.2f} (root mean square, each point left out of the fit)"
-    yield f"  fitted to these: traversal {errors['fitted']['traversal']:.2f}, code {errors['fitted']['code']:.0f}"
+    factors = ", ".join(f"{kind} {factor:.2f}" for kind, factor in errors["factor"].items())
+    yield f"  within a factor of (root mean square, each point left out of the fit): {factors}"
+    yield "  fitted to these: " + ", ".join(f"{name} {number:.4g}" for name, number in errors["fitted"].items())

@@ -27,19 +27,25 @@ QUERY_REGISTERS = {"cwbvh": 96, "bvh2": 91}
 #: Instructions of a megakernel apart from its two traversals: those that all materials share, which is the number for
 #: one diffuse material (scenes/cornell.toml); and of the traversals.
 SHARED_INSTRUCTIONS, TRAVERSAL_INSTRUCTIONS = 2100, 1100
+#: The same of the queues' stage shade.
+SHARED_SHADE = 1384
 #: Bytes per ray or surface that the stages of queues read and write: the structs of kernels/integrator/wavefront.cl.
 STATE_BYTES = {"extend": 44, "shade": 244, "connect": 80}
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """Numbers fitted to measured rates (calibrate.py). traversal: measured over modelled time of traversals;
-    code: instructions of shading that issue one per cycle; longer code takes longer in proportion, as it misses the
-    instruction cache."""
+    """Numbers fitted to measured rates (calibrate.py).
+
+    - traversal: measured over modelled time of traversals
+    - code: instructions of a megakernel's shading that issue one per cycle; longer code takes longer in proportion
+    - shade: cycles per instruction of the queues' stage of that name
+    """
 
     traversal: float
     code: float
+    shade: float
 
 
 #: As fitted to all points of measured.toml.
-FITTED = Fitted(traversal=1.69, code=1160.0)
+FITTED = Fitted(traversal=1.67, code=1160.0, shade=1.36)

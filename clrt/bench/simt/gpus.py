@@ -59,9 +59,9 @@ _H200 = Gpu(
     memory_cycles=600,
 )
 #: Counts, sizes, bandwidths and the highest clock are those that the makers state. Latencies of loads: RDNA 2's second
-#: cache takes 66 ns longer than its first, memory 226 ns (Chips and Cheese 2021); Turing's caches take 32 and 236 cycles
-#: (github.com/sjfeng1999/gpu-arch-microbenchmark), those of larger chips are estimated to take longer; all of Arc's are
-#: estimates. Rates depend little on them: see docs/measurements/gpu-model.md.
+#: cache takes 66 ns longer than its first, memory 226 ns (Chips and Cheese 2021); Turing's caches take 32 and 236
+#: cycles (github.com/sjfeng1999/gpu-arch-microbenchmark), those of larger chips are estimated to take longer; all of
+#: Arc's are estimates. Rates depend little on them (docs/measurements/gpu-model.md).
 GPUS = {
     "H200": _H200,
     "H100": replace(_H200, name="NVIDIA H100 SXM", memory_gbs=3350),

@@ -11,6 +11,8 @@ from typing import Any
 from .variants import Program
 
 KINDS = ("primary", "bounce", "shadow", "occluded")
+#: Samples in the times of stages.
+STAGE_SAMPLES = 1 << 23
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class QueryPoint:
 
 @dataclass(frozen=True)
 class ScenePoint:
-    """Samples per second of a scene's image."""
+    """Samples per second of a scene's image, or of one stage of its queues."""
 
     gpu: str
     scene: str
@@ -40,12 +42,12 @@ class ScenePoint:
     layout: str
     size: int
     rate: float
-    program: Program
+    stage: str | None = None
 
     @property
     def name(self) -> str:
         """Return what was measured."""
-        return f"{self.scene}, {self.variant}, {self.layout}"
+        return f"{self.scene}, {self.layout}, {self.variant}" + (f": {self.stage}" if self.stage else "")
 
 
 @cache
@@ -61,19 +63,25 @@ def measured_queries() -> tuple[QueryPoint, ...]:
 
 @cache
 def measured_scenes() -> tuple[ScenePoint, ...]:
-    """Return all measured rates of scenes."""
-    return tuple(
-        ScenePoint(
-            row["gpu"],
-            row["scene"],
-            row["variant"],
-            row["layout"],
-            row["size"],
-            1e6 * row["msamples"],
-            Program(row["registers"], row["instructions"]),
-        )
+    """Return all measured rates of scenes, and of the stages of their queues."""
+    whole = [
+        ScenePoint(row["gpu"], row["scene"], row["variant"], row["layout"], row["size"], 1e6 * row["msamples"])
         for row in _rows("scenes")
-    )
+    ]
+    stages = [
+        ScenePoint(
+            row["gpu"], row["scene"], "queues", row["layout"], row["size"], STAGE_SAMPLES / row[stage] * 1e3, stage
+        )
+        for row in _rows("stages")
+        for stage in ("extend", "shade", "connect")
+    ]
+    return (*whole, *stages)
+
+
+@cache
+def measured_programs() -> dict[str, Program]:
+    """Return the programs of scenes by name."""
+    return {row["scene"]: Program(row["registers"], row["instructions"], row["shade"]) for row in _rows("programs")}
 
 
 def _rows(table: str) -> list[dict[str, Any]]:

@@ -60,8 +60,6 @@ def traversal_seconds(gpu: Gpu, traversal: Traversal, registers: int, fitted: Fi
     return max(computed, missed_bytes / (gpu.memory_gbs * 1e9))
 
 
-def shading_seconds(gpu: Gpu, warps: int, executed: float, instructions: float, fitted: Fitted) -> float:
-    """Return the seconds in which all cores shade `warps` warps. executed: instructions that each executes, of those in
-    the program."""
-    cycles = warps * executed * max(1.0, instructions / fitted.code) * gpu.cycles / gpu.schedulers
-    return cycles / (gpu.cores * gpu.ghz * 1e9)
+def shading_seconds(gpu: Gpu, warps: int, cycles: float) -> float:
+    """Return the seconds in which all cores shade `warps` warps, each of which takes a scheduler so many cycles."""
+    return warps * cycles * gpu.cycles / (gpu.schedulers * gpu.cores * gpu.ghz * 1e9)

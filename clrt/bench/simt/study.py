@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import exp
 from typing import Any
 
@@ -15,7 +15,7 @@ from .calibrate import Point, fit, leave_one_out, query_point, query_rate, rms, 
 from .costs import FITTED, INSTRUCTIONS, QUERY_REGISTERS
 from .gpus import GPUS, Gpu
 from .groups import held, warps_in_groups
-from .measured import measured_queries, measured_scenes
+from .measured import measured_programs, measured_queries, measured_scenes
 from .variants import STAGES, VARIANTS, Program, Simulation, simulate
 from .visits import EXTEND, KINDS, Ints, Visits, label
 from .warps import LINE, Warps, in_paths, in_queues, traversal_passes
@@ -27,7 +27,7 @@ GROUPS = (32, 64, 128, 256)
 #: The GPU whose caches and warps are simulated where none is named.
 REFERENCE = "H200"
 #: A scene's program, if it has not been measured: about the median of the gallery's.
-USUAL = Program(registers=208, instructions=6500)
+USUAL = Program(registers=208, instructions=6500, shade=4000)
 #: Rates in Grays/s that others published for their own kernels and scenes, which this model does not have: GPU, source,
 #: lowest and highest.
 PUBLISHED = {
@@ -73,42 +73,36 @@ class Queries:
 
 def scene_points(name: str, sample: Sample) -> Iterator[Point]:
     """Yield the measured points of a scene, by its file's name without suffix, in the sample's layout."""
+    simulations: dict[tuple[str, int], Simulation] = {}
     for point in measured_scenes():
-        if point.scene == name and point.layout == sample.layout:
-            gpu = GPUS[point.gpu]
-            visits, data = sample.visits, sample.data_bytes
-            yield scene_point(point, simulate(visits, point.variant, gpu.width, sample.layout, data))
-
-
-def program_of(name: str) -> Program | None:
-    """Return the program of a measured scene."""
-    return next((point.program for point in measured_scenes() if point.scene == name), None)
+        if (point.scene, point.layout) == (name, sample.layout):
+            key = point.variant, GPUS[point.gpu].width
+            if key not in simulations:
+                simulations[key] = simulate(sample.visits, *key, sample.layout, sample.data_bytes)
+            yield scene_point(point, simulations[key], measured_programs()[name])
 
 
 def errors_at(points: Iterable[Point]) -> dict[str, Any]:
     """Return measured and modelled rates, and the errors with the stored numbers and with those fitted to all others.
 
-    factor: exp of the root mean square of log(modelled / measured), left one out.
+    factor: by kind of points, exp of the root mean square of log(modelled / measured), each left out of the fit.
     """
     listed = list(points)
     left_out = leave_one_out(listed)
-    each = {True: iter(left_out["queries"]), False: iter(left_out["scenes"])}
     rows = [
         {
             "gpu": point.gpu,
+            "kind": point.kind,
             "point": point.name,
             "measured": point.measured,
             "modelled": point.modelled(FITTED),
-            "left_out": exp(next(each[point.is_query])),
+            "left_out": exp(error),
         }
-        for point in listed
+        for point, error in zip(listed, left_out)
     ]
-    fitted = fit(listed)
-    return {
-        "fitted": {"traversal": fitted.traversal, "code": fitted.code},
-        "factor": {kind: exp(rms(errors)) for kind, errors in left_out.items() if len(errors) > 1},
-        "rows": rows,
-    }
+    kinds = dict.fromkeys(point.kind for point in listed)
+    factor = {kind: exp(rms([e for p, e in zip(listed, left_out) if p.kind == kind])) for kind in kinds}
+    return {"fitted": asdict(fit(listed)), "factor": factor, "rows": rows}
 
 
 def warps_of(sample: Sample, layout: str) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .costs import QUERY_REGISTERS, SHARED_INSTRUCTIONS, STATE_BYTES, TRAVERSAL_INSTRUCTIONS, Fitted
+from .costs import QUERY_REGISTERS, SHARED_INSTRUCTIONS, SHARED_SHADE, STATE_BYTES, TRAVERSAL_INSTRUCTIONS, Fitted
 from .gpus import Gpu
 from .misses import line_stream, miss_curve
 from .model import Traversal, shading_seconds, traversal_seconds
@@ -20,16 +20,19 @@ STAGES = {EXTEND: "extend", CONNECT: "connect"}
 
 @dataclass(frozen=True)
 class Program:
-    """The megakernel of a scene as compiled: registers per lane, and instructions."""
+    """A scene's programs as compiled: registers per lane and instructions of the megakernel, and instructions of the
+    queues' stage shade."""
 
     registers: int
     instructions: int
+    shade: int
 
 
 @dataclass(frozen=True)
 class Simulation:
     """A variant simulated with warps of a width. traversals, traced: by stage, and how many rays; shading: a pass per
-    type of material in a warp; segments: warps that trace a segment; types: of materials in the scene."""
+    type of material in a warp; unsorted: the same without sorting; segments: warps that trace a segment; types: of
+    materials in the scene."""
 
     variant: str
     width: int
@@ -41,6 +44,7 @@ class Simulation:
     traversals: dict[str, Traversal]
     traced: dict[str, int]
     shading: Passes
+    unsorted: Passes
     shaded_warps: int
 
     def seconds(self, gpu: Gpu, program: Program, fitted: Fitted) -> float:
@@ -60,17 +64,25 @@ class Simulation:
             )
             for stage, each in self.traversals.items()
         }
-        code = max(0, program.instructions - TRAVERSAL_INSTRUCTIONS)
-        met = self.shading.passes / (self.shaded_warps * self.types) if self.shaded_warps else 1.0
-        executed = min(code, SHARED_INSTRUCTIONS) + max(0, code - SHARED_INSTRUCTIONS) * met
-        seconds["shade"] = shading_seconds(gpu, self.segments, executed, code, fitted)
         if megakernel:
+            code = max(0, program.instructions - TRAVERSAL_INSTRUCTIONS)
+            executed = self._executed(self.shading, code, SHARED_INSTRUCTIONS)
+            slowed = max(1.0, code / fitted.code)
+            seconds["shade"] = shading_seconds(gpu, self.segments, executed * slowed)
             return seconds
+        share = self._executed(self.shading, program.shade, SHARED_SHADE)
+        share /= self._executed(self.unsorted, program.shade, SHARED_SHADE)
+        seconds["shade"] = shading_seconds(gpu, self.segments, fitted.shade * program.shade * share)
         handled = self.traced | {"shade": self.surfaces}
         return {
             stage: max(each, handled[stage] * STATE_BYTES[stage] / (gpu.memory_gbs * 1e9))
             for stage, each in seconds.items()
         }
+
+    def _executed(self, passes: Passes, code: int, shared: int) -> float:
+        """Return the instructions that a warp executes: `shared` ones, and others by the types of material it meets."""
+        met = passes.passes / (self.shaded_warps * self.types) if self.shaded_warps else 1.0
+        return min(code, shared) + max(0, code - shared) * met
 
 
 def simulate(
@@ -98,6 +110,7 @@ def simulate(
         },
         {name: int(np.count_nonzero(visits.stage == stage)) for stage, name in STAGES.items()},
         shading_passes(visits, warps),
+        shading_passes(visits, in_queues(visits, width, position) if variant == "sorted" else warps),
         len(np.unique(warps.of_surface)),
     )
 
