@@ -63,7 +63,7 @@ def simt_command(
         raise UsageError("--plot draws the warps of scenes: add --scene FILE")
     loaded = {file.stem: load(file) for file in files}
     if len(loaded) < len(files):
-        raise UsageError("scenes are told apart by their files' names, of which two are equal; rename one")
+        raise UsageError("two scenes have files of the same name; rename one")
     opened, effort = open_device(device), QUICK if quick else Effort()
     queries, scenes = Queries(opened, effort), {}
     results: dict[str, Any] = {"quick": quick, "scenes": {}}

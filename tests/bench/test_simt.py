@@ -304,7 +304,7 @@ def test_the_command_writes_what_it_prints(tmp_path: Path) -> None:
         (["--plot", "a.png"], "add --scene FILE"),
         (["--scene", str(SCENES / "local.toml")], "local.toml: the integrator local follows no paths"),
         (["--scene", str(SCENES / "furnace.toml")], "furnace.toml: no ray enters a BVH"),
-        (["--scene", str(SCENES / "spot.toml"), "--scene", str(SCENES / "spot.toml")], "two are equal"),
+        (["--scene", str(SCENES / "spot.toml"), "--scene", str(SCENES / "spot.toml")], "files of the same name"),
     ],
 )
 def test_what_cannot_be_simulated_is_named(
