@@ -37,6 +37,8 @@ RECORDS = {
     "leaf_spheres": "LeafSphere",
     "instances": "Instance",
     "visits": "Visits",
+    "visit_ranges": "VisitRange",
+    "visit_words": "VisitWord",
 }
 
 
@@ -46,14 +48,15 @@ def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
 
 
 def tree_defines(tree: Layout) -> dict[str, int]:
-    """Return the defines PACK_SIZE and STACK_SIZE, and COUNT_VISITS if visits are counted (kernels/traverse/visits.cl).
+    """Return the defines PACK_SIZE and STACK_SIZE, and COUNT_VISITS or RECORD_VISITS (kernels/traverse/visits.cl).
 
     STACK_SIZE suffices for the traversal; it is rounded up to a multiple of 64 so that BVHs share programs.
     """
     if tree is NO_RAYS:
         return {}
     defines = {"PACK_SIZE": TREES[tree.name][1], "STACK_SIZE": max(64, -(-tree.stack // 64) * 64)}
-    return defines | ({"COUNT_VISITS": 1} if "visits" in tree.buffers else {})
+    recorded = {"visits": "COUNT_VISITS", "visit_words": "RECORD_VISITS"}
+    return defines | {define: 1 for name, define in recorded.items() if name in tree.buffers}
 
 
 def tree_features(triangles: bool, spheres: bool, lone: bool = False, rays: bool = True) -> dict[str, bool]:

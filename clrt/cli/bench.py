@@ -20,6 +20,7 @@ from .bench_peers import peers_command
 from .bench_poses import poses_command
 from .bench_rays import rays_command
 from .bench_render_fidelity import render_fidelity_command
+from .bench_simt import simt_command
 from .bench_theses import theses_command
 from .command_group import CommandGroup
 
@@ -27,7 +28,7 @@ from .command_group import CommandGroup
 @click.group(cls=CommandGroup)
 def command() -> None:
     """Measure speed and accuracy: rays, build, hits, peers, load, converge, agree, combinations, floor,
-    blender, poses, mitsuba-data, render-fidelity, numerics, theses, farm, gpu."""
+    blender, poses, mitsuba-data, render-fidelity, numerics, theses, farm, gpu, simt."""
 
 
 for each in (
@@ -48,5 +49,6 @@ for each in (
     theses_command,
     farm_command,
     gpu_command,
+    simt_command,
 ):
     command.add_command(each)

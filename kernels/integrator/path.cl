@@ -2,6 +2,7 @@
 // segments; removed: by clamps.
 #include "integrator/camera_rays.cl"
 #include "integrator/path_segment.cl"
+#include "traverse/visits.cl"
 
 static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
                                ureal *rays, real3 *direct, real *removed) {
@@ -9,6 +10,7 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
     Path path = path_along(ray->origin, ray->direction);
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
+        VISIT(segments, depth);
         Surface surface;
         Hits hits = first_surface(scene, path.origin, path.wi, depth == 1, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
@@ -24,6 +26,7 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
 #if DISPERSION
         surface.throughput = path.beta;
 #endif
+        VISIT(shading, surface.material);
         Shading shading = shading_at(scene, path.wi, &surface);
 #if LIGHTS
         ShadowRay shadow;

@@ -22,13 +22,14 @@ static inline float enter_box(const SlabRay *ray, global const Node *node, float
 static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int first, int count, const bool stop_at_first, Hit *hit) {
 #if LEAF_SPHERES
     if (count < 0) {
+        VISIT(spheres, first);
         hit_spheres(ray, RECORD(scene->leaf_spheres, first), -count, hit);
         return;
     }
 #endif
 #if TRIANGLES
     for (int i = first; i < first + count; ++i) {
-        VISIT(tests);
+        VISIT(tests, i);
         hit_triangles(ray, RECORD(scene->leaf_triangles, i), stop_at_first, hit);
     }
 #endif
@@ -46,7 +47,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     for (;;) {
         int count = RECORD(scene->nodes, node)->count, first = RECORD(scene->nodes, node)->left_first;
         if (count == 0) {
-            VISIT(nodes);
+            VISIT(nodes, first);
             float left = enter_box(&slabs, RECORD(scene->nodes, first), hit.t);
             float right = enter_box(&slabs, RECORD(scene->nodes, first + 1), hit.t);
             bool left_first = left <= right;
@@ -68,6 +69,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
                 continue;
             }
 #endif
+            VISIT(leaves, first);
             hit_leaf(scene, &leaf, first, count, stop_at_first, &hit);
             if (stop_at_first && hit.primitive >= 0) return hit;
         }

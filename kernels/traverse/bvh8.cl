@@ -19,7 +19,7 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int referenc
     }
 #endif
 #if TRIANGLES
-    VISIT(tests);
+    VISIT(tests, leaf >> 4);
     hit_triangles(ray, RECORD(scene->packs, leaf >> 4), stop_at_first, hit);
 #endif
 }
@@ -56,7 +56,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     int top = 0, reference = 0;
     for (;;) {
         if (reference >= 0) {
-            VISIT(nodes);
+            VISIT(nodes, reference);
             global const Node *node = RECORD(scene->nodes, reference);
             float entry[8];
             uint entered = enter_boxes(&slabs, node, hit.t, entry);

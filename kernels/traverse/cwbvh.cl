@@ -71,12 +71,13 @@ static inline void hit_primitive(const Scene *scene, const LeafRay *ray, int i, 
     if (sphere >= 0)
 #endif
     {
+        VISIT(spheres, sphere);
         hit_spheres(ray, RECORD(scene->leaf_spheres, sphere), 1, hit);
         return;
     }
 #endif
 #if TRIANGLES
-    VISIT(tests);
+    VISIT(tests, i);
     hit_triangles(ray, RECORD(scene->leaf_triangles, i), stop_at_first, hit);
 #endif
 }
@@ -101,7 +102,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
         if (nodes.bits > 0x00ffffff) waiting[top++] = nodes;
         uint slot = (highest - 24) ^ order;
         uint node = nodes.first + popcount(nodes.bits & ((1u << slot) - 1));
-        VISIT(nodes);
+        VISIT(nodes, node);
         enter_node(&slabs, RECORD(scene->nodes, node), order, hit.t, &nodes, &primitives);
 #if INSTANCES
         if (in_world(&leaf) && primitives.bits) {

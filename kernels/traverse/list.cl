@@ -12,7 +12,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     LeafRay leaf = leaf_ray(rays, ray, lane);
 #if TRIANGLES
     for (int i = 0; i < scene->counts.triangles && !(stop_at_first && hit.primitive >= 0); ++i) {
-        VISIT(tests);
+        VISIT(tests, i);
         hit_triangles(&leaf, RECORD(scene->leaf_triangles, i), stop_at_first, &hit);
     }
 #endif

@@ -60,7 +60,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
 #if TRIANGLES
     uint chosen = (uint)LANE_INT(rays->chosen, lane);
-    for (int i = 0; i < RECORD(scene->packs, 0)->count; ++i) if (is_chosen(chosen, i)) VISIT(tests);
+    for (int i = 0; i < RECORD(scene->packs, 0)->count; ++i) if (is_chosen(chosen, i)) VISIT(tests, i);
     if (!meet_packs(&leaf.triangle_ray, ray, scene->packs, chosen, stop_at_first, &hit))
         hit = meet_packs_exactly(&leaf, scene->packs, stop_at_first, *nearest);
 #endif

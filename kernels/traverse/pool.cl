@@ -77,7 +77,7 @@ static inline int next_waiting(Flight *f, const bool stop_at_first) {
 }
 
 static inline int visit_node(const Scene *scene, Flight *f, const bool stop_at_first) {
-    VISIT(nodes);
+    VISIT(nodes, f->reference);
     global const Node *node = RECORD(scene->nodes, f->reference);
     float8 entry;
     int8 mask = enter_eight(&f->ray.boxes, node->lo[0], f->hit.t, &entry);

@@ -74,6 +74,7 @@ static inline Hits next_hit(const Scene *scene, real3 origin, real3 direction, r
         ray.after_instance = LANE_INT(after->instance, lane);
 #endif
 #endif
+        VISIT(closest, 0);
         const Hit nearest = {t.lane[lane], 0.0f, 0.0f, primitive.lane[lane]};
         Hit hit = traverse(scene, &rays, &ray, lane, false, &nearest);
         t.lane[lane] = hit.t;
@@ -112,6 +113,7 @@ static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, r
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(enabled, lane)) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
+        VISIT(blocked, 0);
         const Hit none = {ray.t_max, 0.0f, 0.0f, -1};
         found.lane[lane] = traverse(scene, &rays, &ray, lane, true, &none).primitive;
     }

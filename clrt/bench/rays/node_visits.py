@@ -10,8 +10,8 @@ from ...device.programs.struct_types import record
 from ...queries.base import TreeQuery
 from .ray_speed import Rays
 
-#: nodes: those whose children's boxes are intersected; tests: intersection tests in leaves, of a triangle or a pack.
-VISITS = record(nodes="u4", tests="u4", pad="2u4")
+#: Counts by what is visited (kernels/traverse/visits.cl).
+VISITS = record(nodes="u4", leaves="u4", tests="u4", spheres="u4", instances="u4", closest="u4", blocked="u4", pad="u4")
 
 
 class _Counting(TreeQuery):
