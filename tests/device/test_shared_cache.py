@@ -173,6 +173,7 @@ def test_everything_that_is_kept_is_of_a_kind(tmp_path: Path, monkeypatch: pytes
         "0a.bin",
         "1.check.json",
         "1.bench.json",
+        "1.tuning.json",
         "2.driver.json",
         "1.loops.json",
         "reference-7.npz",
