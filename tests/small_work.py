@@ -17,7 +17,7 @@ from clrt.bench.kernel_probe import choices
 from clrt.debug.trace import trace_pixel
 from clrt.device.open import Device
 from clrt.output.aov_files import layered
-from clrt.queries.base import TRAVERSALS
+from clrt.queries.query_program import TRAVERSALS
 from clrt.rendering.accumulation.denoiser_guides import render_guides
 from clrt.rendering.accumulation.first_hits import first_hits
 from clrt.rendering.accumulation.launch_plan import LaunchPlan

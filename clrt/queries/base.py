@@ -14,35 +14,25 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..accel.layouts import LANES, Layout
 from ..accel.methods import HitTests
-from ..accel.traversal_kernels import tree_buffers, tree_defines, tree_features, tree_files
-from ..accel.wide import EMPTY
+from ..accel.traversal_kernels import tree_defines
 from ..device.launches.device_arrays import lent, on_host, resident
 from ..device.launches.driver_loop_limits import loop_turns
 from ..device.launches.launch import LaunchSize, run_seconds, wait_for
 from ..device.launches.lent_memory import begin_copy, take_back
 from ..device.open import Device, open_device
-from ..device.programs.preamble import defines, scene_struct, typedefs
-from ..device.programs.program import build, compose, make_kernel
-from ..device.programs.struct_types import record
+from ..device.programs.program import build, make_kernel
 from ..errors import DeviceError, UsageError, check_choice
 from ..float_errors import with_default_errors
 from ..scene.geometry.ray_arrays import Rays, ray_arrays
 from ..scene.geometry.scaling import SceneFrame
+from .query_program import COUNTS, HIT, INSTANCE_HIT, QUERIES, SHARE, TRAVERSALS, hit_record, program_source
 
-HIT = record(t="f4", primitive="i4", u="f4", v="f4")
-INSTANCE_HIT = record(t="f4", primitive="i4", u="f4", v="f4", instance="i4", pad="3i4")
-COUNTS = record(triangles="i4", spheres="i4", pad="2i4")
 #: Maximum number of rays on the device at once, at 44 bytes each.
 CHUNK = 1 << 20
 #: Rays of the first launch, and minimum of any; later ones are sized to take device.launch.TARGET_SECONDS.
 FIRST, FEWEST = 1 << 15, 1 << 12
-#: Traversals of bvh8: single rays, packets of eight coherent ones (kernels/traverse/packet.cl), interleaved pools.
-TRAVERSALS = ("single", "packet", "pool")
-#: Rays in a work-item's pool (kernels/traverse/pool.cl), and rays that a work-item traces in total.
-POOL, SHARE = 32, 512
 #: Rays are coherent if the mean cosine between consecutive ones exceeds this; camera rays are, reflected ones are not.
 COHERENT, PAIRS = 0.9, 1024
-QUERIES = ("closest_hit", "any_hit", "next_hit")
 #: Attributes of a query that a copy creates anew.
 ON_DEVICE = ("device", "_lock", "_kernels", "_scene")
 
@@ -109,8 +99,8 @@ class TreeQuery:
         """Upload a BVH and use it from now on."""
         buffers = {name: resident(self.device, array) for name, array in tree.buffers.items()}
         tree, scene = replace(tree, buffers=buffers), [array.buffer for array in buffers.values()]
-        hit = INSTANCE_HIT if "instances" in buffers else HIT
-        self.tree, self.frame, self._hit, self._scene = tree, frame, hit, scene  # all or none, if interrupted
+        # all or none, if interrupted
+        self.tree, self.frame, self._hit, self._scene = tree, frame, hit_record(tree), scene
 
     @with_default_errors
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:
@@ -239,30 +229,14 @@ class TreeQuery:
 
     def source(self, name: str, traversal: str) -> str:
         """Return the source of the program for `name`, one of QUERIES, and a traversal of TRAVERSALS."""
-        check_choice("query", name, QUERIES)
-        check_choice("traversal", traversal, TRAVERSALS)
-        triangles, spheres = bool(self._counts["triangles"]), bool(self._counts["spheres"])
-        instances = self._hit is INSTANCE_HIT
-        has = tree_features(triangles, spheres) | {
-            "INSTANCES": instances,
-            "NEXT_HIT": name == "next_hit",
-            "LOOP_LIMIT": loop_turns(self.device) is not None,
-        }
-        values = {"LANES": self.device.lanes, **tree_defines(self.tree)}
-        values |= {feature: 1 for feature, present in has.items() if present}
-        values |= {
-            "packet": {"PACKET_RAYS": 1, "EMPTY": EMPTY},
-            "single": {},
-            "pool": {"POOL": POOL, "SHARE": SHARE, "STOP_AT_FIRST": int(name == "any_hit")},
-        }[traversal]
-        preamble = "\n".join(
-            [defines(values), typedefs({"Counts": COUNTS, "RayHit": self._hit}), scene_struct(tree_buffers(self.tree))]
-        )
-        files = tree_files(self.tree.name, self._tests, triangles, spheres, instances=instances)
-        return compose(
-            preamble,
-            "query/query_pool.cl" if traversal == "pool" else "query/query.cl",
-            files | {"PACKETS": ["traverse/packet.cl"] if traversal == "packet" else []},
+        return program_source(
+            name,
+            traversal,
+            self.tree,
+            (bool(self._counts["triangles"]), bool(self._counts["spheres"])),
+            self._tests,
+            self.device.lanes,
+            loop_turns(self.device) is not None,
         )
 
 

@@ -12,7 +12,7 @@ from clrt.bench.numerics.hit_agreement import Case, Effort, measure_case
 from clrt.bench.rays.hard_meshes import icosphere, soup
 from clrt.bench.rays.ray_speed import differing
 from clrt.device.open import Device
-from clrt.queries.base import HIT
+from clrt.queries.query_program import HIT
 
 EFFORT = Effort(rays=300, subdivisions=0, soup=0, list_tests=1 << 17, exact_tests=1 << 18)
 CASES = {"icosphere": Case("icosphere", icosphere(2), True), "soup": Case("soup", soup(500), False)}

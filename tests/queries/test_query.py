@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import clrt
 from clrt.device.open import Device
 from clrt.queries import base
+from clrt.queries.query_program import TRAVERSALS
 
 from ..rendering.rays import grid
 
@@ -124,7 +125,7 @@ def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
     rays = origins, np.concatenate([fan, parallel]), RNG.uniform(1, 4, len(origins))
     queries = [
         clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout="bvh8", traversal=traversal)
-        for traversal in (*base.TRAVERSALS, None)
+        for traversal in (*TRAVERSALS, None)
     ]
     first, *others = [each.closest_hit(*rays) for each in queries]
     assert (first["primitive"] >= 0).mean() > 0.3

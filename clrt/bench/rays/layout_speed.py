@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...accel.methods import TREELESS
-from ...queries.base import TRAVERSALS
+from ...queries.query_program import TRAVERSALS
 from ...queries.mesh import RayQuery
 from ..interleaved import Contestant, race
 from .node_visits import visits_a_ray
