@@ -42,6 +42,17 @@ RECORDS = {
 }
 
 
+#: Unit of the stack's size: the stack of cwbvh, a group per level, is private memory of a GPU's work-item.
+STACK_UNITS = {"cwbvh": 8}
+STACK_UNIT = 64
+
+
+def stack_size(tree: Layout) -> int:
+    """Return the size of the traversal stack, at least that which the BVH needs."""
+    unit = STACK_UNITS.get(tree.name, STACK_UNIT)
+    return max(unit, -(-tree.stack // unit) * unit)
+
+
 def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
     """Return the BVH's buffers with their C types."""
     return {name: (RECORDS[name], array) for name, array in tree.buffers.items()}
@@ -50,11 +61,11 @@ def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
 def tree_defines(tree: Layout) -> dict[str, int]:
     """Return the defines PACK_SIZE and STACK_SIZE, and COUNT_VISITS or RECORD_VISITS (kernels/traverse/visits.cl).
 
-    STACK_SIZE suffices for the traversal; it is rounded up to a multiple of 64 so that BVHs share programs.
+    STACK_SIZE suffices for the traversal; it is rounded up (see STACK_UNITS) so that BVHs share programs.
     """
     if tree is NO_RAYS:
         return {}
-    defines = {"PACK_SIZE": TREES[tree.name][1], "STACK_SIZE": max(64, -(-tree.stack // 64) * 64)}
+    defines = {"PACK_SIZE": TREES[tree.name][1], "STACK_SIZE": stack_size(tree)}
     recorded = {"visits": "COUNT_VISITS", "visit_words": "RECORD_VISITS"}
     return defines | {define: 1 for name, define in recorded.items() if name in tree.buffers}
 

@@ -12,43 +12,44 @@
 // exact, and the rounding of the sum is within the margin of SLAB_PAD. The roundings of p − origin, and of plane − p
 // during the build, are below 3 ulps of p − origin; ORIGIN_PAD is 4. The product with 1/direction stays separate, at
 // one operation per plane, so that zeros and infinities behave as they do there.
+//
+// Registers limit how many rays a GPU has in flight. So far planes use the 1/direction of the near ones, and the least
+// of their t is pushed out instead; and the axes are written out, since some compilers (LLVM's for NVIDIA) do not
+// unroll a loop over them and then keep in memory what it indexes.
 #include "traverse/slab_rays.cl"
 #include UPPER_LEVEL
 
-typedef struct { float step[3], near[3], far[3]; } Grid;   // the step, and p − origin for near and far planes
+// From (1 − SLAB_PAD)/direction to (1 + SLAB_PAD)/direction, with the roundings of both.
+#define FAR_PAD (1.0f + 3.0f * SLAB_PAD)
+
+typedef struct { float step, near, far; } Planes;   // of one axis: the step, and p − origin for near and far planes
+typedef struct { float4 near, far; } Spans;         // the t at which a ray enters and leaves four children
 typedef struct { uint first, bits; } Group;
 
-static inline Grid node_grid(const SlabRay *ray, uint4 frame) {
-    Grid grid;
-    float p[3] = {as_float(frame.x), as_float(frame.y), as_float(frame.z)};
-    for (int axis = 0; axis < 3; ++axis) {
-        grid.step[axis] = as_float((frame.w >> 8 * axis & 0xff) << 23);
-        float base = p[axis] - ray->origin[axis];
-        float pad = (base < 0.0f ? -base : base) * (ray->backward[axis] ? -ORIGIN_PAD : ORIGIN_PAD);
-        grid.near[axis] = base - pad;
-        grid.far[axis] = base + pad;
-    }
-    return grid;
+static inline Planes planes_of(const SlabRay *ray, int axis, uint p, uint exponent) {
+    float base = as_float(p) - ray->origin[axis];
+    float pad = (base < 0.0f ? -base : base) * (ray->backward[axis] ? -ORIGIN_PAD : ORIGIN_PAD);
+    return (Planes){as_float((exponent & 0xff) << 23), base - pad, base + pad};
 }
 
-// Intersect four children of a node, one byte each in meta and in each axis of low and high; return the bits of those
-// hit.
-static inline uint enter_four(const SlabRay *ray, const Grid *grid, uint order, float t_max, uint meta,
-                              const uint low[3], const uint high[3]) {
-    float4 t_near = FIRST_T(ray), t_far = t_max;
-    for (int axis = 0; axis < 3; ++axis) {
-        uint near_bytes = ray->backward[axis] ? high[axis] : low[axis];
-        uint far_bytes = ray->backward[axis] ? low[axis] : high[axis];
-        float4 near = (convert_float4(as_uchar4(near_bytes)) * grid->step[axis] + grid->near[axis]) * ray->near[axis];
-        float4 far = (convert_float4(as_uchar4(far_bytes)) * grid->step[axis] + grid->far[axis]) * ray->far[axis];
-        t_near = fmax(near, t_near);   // these drop NaN, as box.cl's comparisons do, and are one instruction on GPUs
-        t_far = fmin(far, t_far);
-    }
+// Clip the spans of four children to the slabs of an axis, one byte each in low and in high.
+static inline void clip(Spans *spans, const SlabRay *ray, int axis, const Planes *planes, uint low, uint high) {
+    float4 near_side = convert_float4(as_uchar4(ray->backward[axis] ? high : low));
+    float4 far_side = convert_float4(as_uchar4(ray->backward[axis] ? low : high));
+    float4 near = (near_side * planes->step + planes->near) * ray->near[axis];
+    float4 far = (far_side * planes->step + planes->far) * ray->near[axis];
+    spans->near = fmax(near, spans->near);   // these drop NaN, as box.cl's comparisons do, and are one instruction on
+    spans->far = fmin(far, spans->far);      // GPUs
+}
+
+// Return the bits of those of four children that are hit, one byte each in meta.
+static inline uint entered(const Spans *spans, uint order, float t_max, uint meta) {
     // For nodes the low bits of meta are 24 + slot, permuted to the ray's order; for leaves they are below 24 and
     // unchanged.
     uint nodes = (meta & meta << 1 & 0x10101010) >> 4;
     uint4 place = convert_uint4(as_uchar4((meta ^ nodes * order) & 0x1f1f1f1f));
-    uint4 bits = convert_uint4(as_uchar4(meta >> 5 & 0x07070707)) << place & as_uint4(t_near <= t_far);
+    uint4 hit = as_uint4(spans->near <= fmin(spans->far * FAR_PAD, t_max));
+    uint4 bits = convert_uint4(as_uchar4(meta >> 5 & 0x07070707)) << place & hit;
     return bits.x | bits.y | bits.z | bits.w;
 }
 
@@ -56,10 +57,16 @@ static inline void enter_node(const SlabRay *ray, global const Node *node, uint 
                               Group *primitives) {
     global const uint4 *words = (global const uint4 *)node;
     uint4 frame = words[0], links = words[1], a = words[2], b = words[3], c = words[4];
-    uint low[2][3] = {{a.x, a.z, b.x}, {a.y, a.w, b.y}}, high[2][3] = {{b.z, c.x, c.z}, {b.w, c.y, c.w}};
-    Grid grid = node_grid(ray, frame);
-    uint bits = enter_four(ray, &grid, order, t_max, links.z, low[0], high[0])
-              | enter_four(ray, &grid, order, t_max, links.w, low[1], high[1]);
+    Planes x = planes_of(ray, 0, frame.x, frame.w), y = planes_of(ray, 1, frame.y, frame.w >> 8);
+    Planes z = planes_of(ray, 2, frame.z, frame.w >> 16);
+    Spans first = {FIRST_T(ray), INFINITY}, second = first;   // children 0 … 3 and 4 … 7
+    clip(&first, ray, 0, &x, a.x, b.z);
+    clip(&first, ray, 1, &y, a.z, c.x);
+    clip(&first, ray, 2, &z, b.x, c.z);
+    clip(&second, ray, 0, &x, a.y, b.w);
+    clip(&second, ray, 1, &y, a.w, c.y);
+    clip(&second, ray, 2, &z, b.y, c.w);
+    uint bits = entered(&first, order, t_max, links.z) | entered(&second, order, t_max, links.w);
     *nodes = (Group){links.x, (bits & 0xff000000) | frame.w >> 24};   // slots that are nodes, to index children
     *primitives = (Group){links.y, bits & 0x00ffffff};
 }
