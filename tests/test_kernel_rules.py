@@ -92,3 +92,48 @@ def test_kernels_need_no_more_local_memory_than_every_device_has() -> None:
 def test_local_memory_is_counted() -> None:
     text = "    local uint2 a[N];\n    local float b[3]; // local float c[9];\n    local float3 d[2 * N];"
     assert local_bytes(text, {"N": 5}) == 5 * 8 + 3 * 4 + 2 * 5 * 16
+
+
+#: Constructs that drivers are known to fail at: an image argument that a kernel does not use (OpenCLOn12), enqueueing
+#: by a device (ROCm), builds of hours for loops that must be unrolled (NVIDIA); and what OpenCL C 1.2 leaves optional.
+FRAGILE = {
+    "images": r"\bimage\d+d\w*_t\b|\bread_image|\bwrite_image|\bsampler_t\b",
+    "kernels enqueued by kernels": r"\benqueue_kernel\b|\bndrange_t\b|\bqueue_t\b",
+    "loops that must be unrolled": r"#pragma unroll|\bopencl_unroll_hint\b|\bunroll\s*\(",
+    "double precision": r"\bdouble\d*\b|\bcl_khr_fp64\b",
+    "half precision": r"\bhalf\d*\b(?=[\s*]+\w)|\bcl_khr_fp16\b",
+    "printf": r"\bprintf\s*\(",
+    "variables of a program": r"^(?:static )?global\b[^(;]*;",
+    "inline assembly": r"\basm\b",
+}
+#: Files that unroll loops, whose bodies are short: polynomials, words of a state, cache lines to prefetch.
+UNROLLING = {"bsdf/ggx_albedo.cl", "integrator/compaction.cl", "core/mask.cl"}
+UNROLL = re.compile(r'_Pragma\("unroll"\)')
+
+
+def fragile(text: str) -> list[str]:
+    """Return the names of the constructs of FRAGILE in a kernel file."""
+    code = re.sub(r"//.*", "", text)
+    return [name for name, pattern in FRAGILE.items() if re.search(pattern, code, re.MULTILINE)]
+
+
+def test_what_breaks_drivers_is_absent() -> None:
+    """Local memory, another limit, is counted above."""
+    assert not [(file, found) for file, text in TEXTS.items() if (found := fragile(text))]
+    assert {file for file, text in TEXTS.items() if UNROLL.search(text)} == UNROLLING
+
+
+def test_fragile_constructs_are_found() -> None:
+    text = """
+#pragma unroll 8
+global int counter;
+kernel void k(read_only image2d_t image, global half *a, global float *b) {
+    asm("nop");
+    printf("%f", b[0] + (double)b[1]);
+    enqueue_kernel(get_default_queue(), 0, ndrange_1D(1), ^{});   // half of it, printf()
+}
+"""
+    assert fragile(text) == list(FRAGILE)
+    assert not fragile(
+        "// half a double-word, printf()\nstatic inline void f(global int *a) {}\nkernel void k(global int *a) {}"
+    )

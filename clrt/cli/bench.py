@@ -12,6 +12,7 @@ from .bench_converge import converge_command
 from .bench_farm import farm_command
 from .bench_floor import floor_command
 from .bench_gpu import gpu_command
+from .bench_gpu_code import gpu_code_command
 from .bench_hits import hits_command
 from .bench_load import load_command
 from .bench_mitsuba_data import mitsuba_data_command
@@ -28,7 +29,7 @@ from .command_group import CommandGroup
 @click.group(cls=CommandGroup)
 def command() -> None:
     """Measure speed and accuracy: rays, build, hits, peers, load, converge, agree, combinations, floor,
-    blender, poses, mitsuba-data, render-fidelity, numerics, theses, farm, gpu, simt."""
+    blender, poses, mitsuba-data, render-fidelity, numerics, theses, farm, gpu, gpu-code, simt."""
 
 
 for each in (
@@ -50,5 +51,6 @@ for each in (
     farm_command,
     gpu_command,
     simt_command,
+    gpu_code_command,
 ):
     command.add_command(each)

@@ -24,6 +24,7 @@ KINDS = {
     "speeds of devices": "*.bench.json",
     "tunings of devices": "*.tuning.json",
     "loop limits": "*.loops.json",
+    "code for GPUs": "*.gpu.json",
     "logs": "last-*.log",
     "unfinished files": "unfinished-*",
 }

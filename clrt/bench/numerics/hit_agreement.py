@@ -13,8 +13,8 @@ from ...accel.methods import TREELESS
 from ...accel.traversal_kernels import BUILDER_NAMES, TREES
 from ...device.discovery.discover import choose, find_devices
 from ...errors import ClrtError, UsageError
-from ...queries.query_program import TRAVERSALS
 from ...queries.mesh import RayQuery
+from ...queries.query_program import TRAVERSALS
 from ..rays.hard_meshes import icosphere, soup
 from ..rays.ray_speed import Rays, differing, every
 from ..rays.workloads import Mesh, bumpy_ball

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...accel.methods import TREELESS
-from ...queries.query_program import TRAVERSALS
 from ...queries.mesh import RayQuery
+from ...queries.query_program import TRAVERSALS
 from ..interleaved import Contestant, race
 from .node_visits import visits_a_ray
 from .ray_speed import Floats, Run, differing, every
