@@ -78,12 +78,12 @@ def _compiled(program: GpuProgram, name: str, quick: bool) -> ProgramCode:
 
 
 def _key(source: str, vendor: str, targets: Sequence[str], tools: Sequence[str]) -> str:
-    """Return the name of the file that caches a result, which depends on this package's code as well."""
+    """Return the name of the file that caches a result, which depends on how the compilers are called as well."""
     digest = hashlib.sha256()
     for part in (source, vendor, *targets, *map(tool_version, (*front_end.TOOLS, *tools))):
         digest.update(part.encode() + b"\0")
-    for file in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(file.read_bytes())
+    for name in ("amd", "front_end", "intel", "kernel_code", "nvidia"):
+        digest.update(Path(__file__).with_name(f"{name}.py").read_bytes())
     return f"{digest.hexdigest()}.gpu.json"
 
 

@@ -22,8 +22,9 @@ from ...rendering.aovs import AOVS
 from ...rendering.compile.choices import Choices
 from ...rendering.compile.compile_scene import compile_scene
 
-#: Choices of a device that is a GPU (see device/open.py).
+#: Choices of a device that is a GPU (see device/open.py), and with a kernel per stage of path tracing.
 ON_GPU = Choices(lanes=1, layout="cwbvh")
+BY_QUEUES = replace(ON_GPU, paths="queues")
 #: Layouts that GPUs use, the default first.
 LAYOUTS = ("cwbvh", "bvh2")
 #: The scenes whose programs of other kinds are compiled, too: AOVs, and the rasterizer.
@@ -48,9 +49,13 @@ def gallery() -> list[Path]:
 
 
 def scene_programs(paths: Iterable[Path]) -> Iterator[GpuProgram]:
-    """Yield the programs that compute the images of scenes."""
+    """Yield the programs that compute the images of scenes: the megakernel, and for paths the kernels of the queues."""
     for path in paths:
-        yield GpuProgram(f"scene/{path.stem}", compile_scene(load(path), ON_GPU).source)
+        scene = load(path)
+        megakernel, queues = (compile_scene(scene, choices).source for choices in (ON_GPU, BY_QUEUES))
+        yield GpuProgram(f"scene/{path.stem}", megakernel)
+        if queues != megakernel:
+            yield GpuProgram(f"queues/{path.stem}", queues)
 
 
 def all_programs() -> Iterator[GpuProgram]:
