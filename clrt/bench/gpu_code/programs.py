@@ -20,7 +20,7 @@ from ...queries import query_program
 from ...rendering.accumulation.first_hits import first_hit_program
 from ...rendering.aovs import AOVS
 from ...rendering.compile.choices import Choices
-from ...rendering.compile.compile_scene import compile_scene
+from ...rendering.compile.compile_scene import QUEUES, compile_scene
 
 #: Choices of a device that is a GPU (see device/open.py), and with a kernel per stage of path tracing.
 ON_GPU = Choices(lanes=1, layout="cwbvh")
@@ -52,10 +52,10 @@ def scene_programs(paths: Iterable[Path]) -> Iterator[GpuProgram]:
     """Yield the programs that compute the images of scenes: the megakernel, and for paths the kernels of the queues."""
     for path in paths:
         scene = load(path)
-        megakernel, queues = (compile_scene(scene, choices).source for choices in (ON_GPU, BY_QUEUES))
-        yield GpuProgram(f"scene/{path.stem}", megakernel)
-        if queues != megakernel:
-            yield GpuProgram(f"queues/{path.stem}", queues)
+        megakernel, queues = (compile_scene(scene, choices) for choices in (ON_GPU, BY_QUEUES))
+        yield GpuProgram(f"scene/{path.stem}", megakernel.source)
+        if queues.entry == QUEUES:
+            yield GpuProgram(f"queues/{path.stem}", queues.source)
 
 
 def all_programs() -> Iterator[GpuProgram]:
