@@ -30,7 +30,10 @@ static inline int material_code(const Scene *scene, const Hits *hits) {
     primitive += RECORD(scene->placements, hits->instance)->first;
 #endif
 #if SPHERES
-    if (primitive >= scene->counts.triangles) return RECORD(scene->spheres, primitive - scene->counts.triangles)->material;
+#if TRIANGLES
+    if (primitive >= scene->counts.triangles)
+#endif
+        return RECORD(scene->spheres, primitive - scene->counts.triangles)->material;
 #endif
 #if TRIANGLES
 #if INSTANCES
