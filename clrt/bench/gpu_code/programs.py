@@ -13,14 +13,13 @@ from ...accel.layouts import Layout, pack
 from ...accel.methods import HitTests
 from ...check import floats, integers, kernel_calls
 from ...device.launches.driver_loop_limits import turns_source
-from ...device.programs.kernel_files import kernel_folder
-from ...errors import UsageError
 from ...formats.load_scene import load
 from ...queries import query_program
 from ...rendering.accumulation.first_hits import first_hit_program
 from ...rendering.aovs import AOVS
 from ...rendering.compile.choices import Choices
 from ...rendering.compile.compile_scene import QUEUES, compile_scene
+from ..gpu.shipped_scenes import shipped_scenes
 
 #: Choices of a device that is a GPU (see device/open.py), and with a kernel per stage of path tracing.
 ON_GPU = Choices(lanes=1, layout="cwbvh")
@@ -40,14 +39,6 @@ class GpuProgram:
     source: str
 
 
-def gallery() -> list[Path]:
-    """Return the scene files of the repository. Raises UsageError where clrt is installed without it."""
-    folder = Path(str(kernel_folder())).parent / "scenes"
-    if not (scenes := sorted(folder.glob("*.toml"))):
-        raise UsageError(f"{folder} has no scenes, which only the repository of clrt has; name one by --scene")
-    return scenes
-
-
 def scene_programs(paths: Iterable[Path]) -> Iterator[GpuProgram]:
     """Yield the programs that compute the images of scenes: the megakernel, and for paths the kernels of the queues."""
     for path in paths:
@@ -60,7 +51,7 @@ def scene_programs(paths: Iterable[Path]) -> Iterator[GpuProgram]:
 
 def all_programs() -> Iterator[GpuProgram]:
     """Yield the programs of the gallery, of ray queries, BVH builders and refits, AOVs, the rasterizer and checks."""
-    scenes = gallery()
+    scenes = shipped_scenes()
     yield from scene_programs(scenes)
     yield from _other_programs({path.stem: path for path in scenes})
     for layout in LAYOUTS:
