@@ -43,7 +43,7 @@ def test_what_is_installed_is_copied(path: Path) -> None:
         "pyproject.toml",
         config["metadata"]["license_files"],
         config["metadata"]["long_description"].removeprefix("file:").strip(),
-        config["options"]["package_dir"].split("=")[1].strip(),
+        *(line.partition("=")[2].strip() for line in config["options"]["package_dir"].strip().splitlines()),
         "clrt",
     }
     assert copied == needs

@@ -24,6 +24,7 @@ CALLED: list[Path | None] = []
 @click.option("--pictures", type=click.Path(path_type=Path))
 @figures_options
 @click.option("--plot", type=click.Path(path_type=Path))
+@click.option("--output", type=click.Path(path_type=Path))
 def experiment(json_file: Path | None, **others: object) -> None:
     """Experiment that only records that it was begun."""
     CALLED.append(json_file)
@@ -84,7 +85,7 @@ def test_every_experiment_is_checked(name: str) -> None:
     """File options of every experiment have the names that the check knows."""
     each = bench.commands[name]
     options = {option: parameter.name for parameter in each.params for option in parameter.opts}
-    assert options["--json"] == "json_file" and "--force" in options
+    assert (options.get("--json") == "json_file" or "--output" in options) and "--force" in options
     assert all(options.get(option) in (name, None) for name, option in FILES.items())
     folders = {
         parameter.name

@@ -63,11 +63,12 @@ def test_each_result_is_kept_once(places: list[Path], tmp_path: Path, lost: int)
         assert "instead" not in str(caught.value)
         return
     by_ending = {"".join(path.suffixes): path for path in kept if ".raw-" not in path.name}
-    assert set(by_ending) == {".png", ".depth.png", ".exr", ".hdr", ".json"} and len(kept) == 8
+    beside = {f".depth{suffix}" for suffix in EXTENSIONS if suffix not in (".exr", ".hdr")}
+    assert set(by_ending) == {*EXTENSIONS, *beside, ".json"} and len(kept) == 2 * len(EXTENSIONS) + len(beside) + 1
     assert np.array_equal(read_image(by_ending[".exr"]), PIXELS)
     assert np.array_equal(read_image(next(places[lost].glob("a.raw-*.exr"))), RAW)
     assert json.loads(by_ending[".json"].read_text()) == {"spp": 3}
-    assert all(str(path) in str(caught.value) for path in kept if path != by_ending[".depth.png"])
+    assert all(str(path) in str(caught.value) for path in kept if ".depth" not in path.suffixes)
 
 
 def test_what_is_beside_already_is_not_kept_twice(
