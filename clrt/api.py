@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from .file_names import StrPath
 from .float_errors import with_default_errors
 from .formats.load_scene import load as _load
 from .formats.model_choice import ModelChoice
+from .formats.trimesh_models import is_trimesh, scene_of
 from .output.data_images import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
@@ -25,10 +26,13 @@ from .scene.axes_and_units import Axis, LightUnit, Unit
 from .scene.camera_path import frames as _frames
 from .scene.model import Scene
 
+#: A mesh or a scene of trimesh, which has no types.
+Trimesh = Any
+
 
 @with_default_errors
 def load(
-    path: StrPath,
+    path: StrPath | Trimesh,
     camera: str | None = None,
     *,
     up: Axis | None = None,
@@ -43,6 +47,8 @@ def load(
     parameters: Mapping[str, str] = {},
 ) -> Scene:
     """Load a scene file (.toml, Mitsuba's .xml, pbrt's .pbrt) or a bare model (glTF, USD, OBJ, PLY, STL, OFF or 3MF).
+
+    A mesh or scene of trimesh is a bare model, too, with the materials that it has in glTF.
 
     camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left". For a
     bare model also up: which of its axes points up, "x", "y" or "z"; unit: that of its coordinates, "m", "cm", "mm",
@@ -71,13 +77,17 @@ def load(
         light_unit=light_unit,
         ignore_extensions=given or None,
     )
-    return _load(path, camera, up, unit, choice, approximate=approximate, parameters=parameters)
+
+    def load_file(file: StrPath) -> Scene:
+        return _load(file, camera, up, unit, choice, approximate=approximate, parameters=parameters)
+
+    return scene_of(path, load_file) if is_trimesh(path) else load_file(cast(StrPath, path))
 
 
 @listed(RendererOptions, SETTINGS)
 @with_default_errors
 def render(
-    scene: Scene | StrPath,
+    scene: Scene | StrPath | Trimesh,
     *,
     time: float | None = None,
     error: float | None = None,
@@ -85,7 +95,7 @@ def render(
     denoise: bool = False,
     **options: Unpack[RendererOptions],
 ) -> Image:
-    """Render a scene, or the scene in a file, until `spp`, `time` or `error` is reached.
+    """Render a scene, or what `load` accepts, until `spp`, `time` or `error` is reached.
 
     These and `reference` are as in `Renderer.passes`. denoise: see docs/denoise.md; the image keeps its `raw` pixels.
     Raises subclasses of ClrtError.

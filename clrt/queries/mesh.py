@@ -12,7 +12,7 @@ from ..accel.layouts import Layout
 from ..accel.methods import HitTests
 from ..accel.refit import Refitter, can_refit
 from ..device.open import Device, open_device
-from ..errors import SceneError
+from ..errors import SceneError, UsageError
 from ..float_errors import with_default_errors
 from ..scene.geometry.mesh_arrays import finite_points, mesh_arrays, sphere_array
 from ..scene.geometry.ray_arrays import Rays
@@ -23,7 +23,7 @@ from .base import TreeQuery
 class RayQuery(TreeQuery):
     """Triangles and spheres to intersect with rays; `TreeQuery`, the base class, describes rays and hits.
 
-    - vertices: (n, 3) float32, or float64 if far from the origin; faces: (m, 3) int32
+    - vertices: (n, 3) float32, or float64 if far from the origin; faces: (m, 3) int32; or a `trimesh.Trimesh` alone
     - spheres: (s, 4) float32, center and radius, the primitives m … m + s − 1, with u = v = 0
 
     Choices that do not affect the results:
@@ -47,7 +47,7 @@ class RayQuery(TreeQuery):
     def __init__(
         self,
         vertices: ArrayLike,
-        faces: ArrayLike,
+        faces: ArrayLike | None = None,
         *,
         spheres: ArrayLike | None = None,
         device: str | int | None = None,
@@ -59,6 +59,10 @@ class RayQuery(TreeQuery):
         traversal: str | None = None,
     ) -> None:
         """Build the BVH; see the class."""
+        if faces is None and hasattr(vertices, "faces"):
+            vertices, faces = vertices.vertices, vertices.faces  # type: ignore[union-attr]
+        elif faces is None:
+            raise UsageError("faces is missing; give vertices and faces, or a mesh of trimesh")
         points, self._faces = mesh_arrays(vertices, faces)
         self._spheres = sphere_array(np.zeros((0, 4)) if spheres is None else spheres)
         tests, opened = HitTests(triangle, box, sphere), open_device(device)
