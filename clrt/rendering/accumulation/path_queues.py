@@ -17,7 +17,7 @@ from ..compile.compile_scene import CompiledScene
 #: Samples whose paths are in the queues together: a large GPU is still busy when most of them have ended.
 MOST_SLOTS, FEWEST_SLOTS = 1 << 23, 1 << 10
 #: Maximum fraction of the device's memory for the queues, as a divisor.
-SHARE = 4
+SHARE = 8
 #: Maximum work-items of a stage per compute unit; each takes every n-th entry of its queue. Fewer from the depth LATE
 #: on, where queues are shorter and an empty launch should cost little.
 WORK_ITEMS, LATE_WORK_ITEMS, LATE = 1 << 14, 1 << 11, 5
