@@ -10,9 +10,10 @@ from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .animation import Positive, Vector
+from .camera_matrices import Convention, intrinsics_of, pose_of, world_to_camera_of
 from .fields.limits import Gt, Lt
 from .fields.tuples import tuples_for_lists
 from .materials.textures import NonNegative
@@ -28,7 +29,9 @@ class Camera:
     projection:
 
     - "perspective": pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
-      `look_at`); `fov_degrees`: vertical, full angle.
+      `look_at`); `fov_degrees`: vertical, full angle. For calibrated cameras, see `from_matrix`: `lens_shift`, the
+      image's center from the optical axis, to the right and up, in widths and heights of the image; `pixel_aspect`, a
+      pixel's height over its width in focal lengths, fx / fy; `skew`, K[0, 1] / K[0, 0].
     - "orthographic": parallel rays, an image `view_height` high (None: as the perspective view at `look_at`).
     - "equirectangular": all directions, in Environment's mapping for a view along +Z.
     """
@@ -41,6 +44,45 @@ class Camera:
     focus_distance: Positive | None = None
     projection: Projection = "perspective"
     view_height: Positive | None = None
+    lens_shift: tuple[float, float] = (0.0, 0.0)
+    pixel_aspect: Positive = 1.0
+    skew: float = 0.0
+
+    @classmethod
+    def from_matrix(
+        cls,
+        K: ArrayLike,
+        size: tuple[int, int],
+        *,
+        camera_to_world: ArrayLike | None = None,
+        world_to_camera: ArrayLike | None = None,
+        convention: Convention = "opencv",
+        first_pixel: float = 0.5,
+        **fields: Any,
+    ) -> Camera:
+        """Return the camera with the intrinsic matrix K, (3, 3), of images of `size` (width, height) in pixels.
+
+        One of `camera_to_world` and `world_to_camera`, a rigid motion (3, 4) or (4, 4), is its pose, in the convention
+        of "opencv" (x right, y down, z ahead) or "opengl" (x right, y up, z back). first_pixel: both coordinates of the
+        center of the upper left pixel: 0.5, as in COLMAP, or 0, as in OpenCV. fields: others of Camera. Raises
+        UsageError for matrices that are not of these forms. (Hartley and Zisserman, "Multiple View Geometry", 2nd ed.,
+        6.1.)
+        """
+        known: dict[str, Any] = pose_of(camera_to_world, world_to_camera, convention)
+        return cls(**{**intrinsics_of(K, size, first_pixel), **known, **fields})
+
+    def matrix(self, size: tuple[int, int], first_pixel: float = 0.5) -> Doubles:
+        """Return the intrinsic matrix K, (3, 3), for images of `size` (width, height) in pixels; see `from_matrix`."""
+        width, height = size
+        fy = height / 2 / np.tan(np.radians(self.fov_degrees) / 2)
+        fx, less = fy * self.pixel_aspect, 0.5 - first_pixel
+        center = width * (0.5 - self.lens_shift[0]) - less, height * (0.5 + self.lens_shift[1]) - less
+        return np.array([[fx, fx * self.skew, center[0]], [0.0, fy, center[1]], [0.0, 0.0, 1.0]])
+
+    @property
+    def world_to_camera(self) -> Doubles:
+        """The pose as a matrix (4, 4), in OpenCV's convention: x right, y down, z ahead."""
+        return world_to_camera_of(self.position, self.look_at, self.up)
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
@@ -94,13 +136,16 @@ class Perspective(CameraType):
 
     kernel = "pinhole"
     lens_kernel = "thin_lens"
-    reads = frozenset({"aperture_radius", "focus_distance"})
+    reads = frozenset({"aperture_radius", "focus_distance", "lens_shift", "pixel_aspect", "skew"})
 
     @staticmethod
     def axes(camera: Camera, view: View) -> tuple[Doubles, Doubles, Doubles]:
         focus = (camera.focus_distance or view.distance) if camera.aperture_radius else 1.0
-        extent = np.tan(np.radians(camera.fov_degrees) / 2)
-        return (view.right * focus * extent * view.width / view.height, view.up * focus * extent, view.forward * focus)
+        extent = focus * np.tan(np.radians(camera.fov_degrees) / 2)
+        right = view.right * extent * view.width / view.height / camera.pixel_aspect
+        up = extent * (view.up + camera.skew * view.right)
+        across, along = camera.lens_shift
+        return right, up, view.forward * focus + 2 * (across * right + along * up)
 
 
 class Orthographic(CameraType):

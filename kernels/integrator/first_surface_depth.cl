@@ -7,7 +7,7 @@ static inline real3 picture_value(const Scene *scene, const Launch *launch, real
 #if ALL_AROUND
     real depth = t;
 #else
-    real depth = t * dot3(direction, normalize3(broadcast(launch->forward)));
+    real depth = t * dot3(direction, normalize3(cross3(broadcast(launch->up), broadcast(launch->right))));
 #endif
     return splat(depth * (1.0f / SCENE_UNIT));
 }

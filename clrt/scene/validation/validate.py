@@ -253,16 +253,16 @@ def _camera_problems(camera: Camera) -> list[str]:
 
 def _raster_problems(scene: Scene) -> list[str]:
     """Return a problem if the raster integrator does not support the camera."""
-    camera = scene.camera
-    if scene.render.integrator != "raster" or (camera.projection == "perspective" and not camera.aperture_radius):
+    camera, plain = scene.camera, Camera()
+    if scene.render.integrator != "raster":
         return []
-    given = (
-        f"projection = {show(camera.projection)}"
-        if camera.projection != "perspective"
-        else f"aperture_radius = {camera.aperture_radius:g}"
-    )
+    names = ("projection", "aperture_radius", "lens_shift", "skew")
+    given = next((name for name in names if getattr(camera, name) != getattr(plain, name)), None)
+    if given is None:
+        return []
+    shown = f"{given} = {show(getattr(camera, given))}"
     return [
-        f'render.integrator: "raster" supports only pinhole cameras, and the camera has {given}; leave that out, '
+        f'render.integrator: "raster" supports only pinhole cameras, and the camera has {shown}; leave that out, '
         'or write "local"'
     ]
 
