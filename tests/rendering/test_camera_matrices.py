@@ -65,7 +65,7 @@ def test_spheres_are_seen_where_they_project(device: Device, lens: dict[str, Any
     for _ in range(3):
         K, pose = calibrated(rng)
         pixels = np.unique(rng.integers((1, 1), (63, 47), (6, 2)), axis=0)
-        depth: Doubles = rng.uniform(5, 15, len(pixels))
+        depth = rng.uniform(5, 15, len(pixels)).astype(np.float64)
         if lens:
             depth[:] = 9.0
         centers = visible(K, pose, pixels + 0.5, depth)
