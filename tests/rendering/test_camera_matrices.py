@@ -68,7 +68,7 @@ def test_spheres_are_seen_where_they_project(device: Device, lens: dict[str, Any
         depth = rng.uniform(5, 15, len(pixels)).astype(np.float64)
         if lens:
             depth[:] = 9.0
-        centers = visible(K, pose, pixels + 0.5, depth)
+        centers = visible(K, pose, (pixels + 0.5).astype(np.float64), depth)
         spheres = [
             Sphere(center=tuple(center), radius=0.12 * z / K.diagonal().max(), material=Diffuse(emission=(1.0, i, 0.0)))
             for i, (center, z) in enumerate(zip(centers.tolist(), depth.tolist()), start=1)

@@ -41,8 +41,10 @@ def camera_of(plugin: Plugin, size: tuple[int, int], notes: Notes) -> Camera:
     if plugin.kind == "orthographic":
         return replace(camera, projection="orthographic", view_height=2 * lengths[0] / aspect)
     radius = plugin.value("aperture_radius", float, 0.0)
+    across, down = (plugin.value(f"principal_point_offset_{axis}", float, 0.0) for axis in "xy")
     return replace(
         camera,
+        lens_shift=(across, -down),
         fov_degrees=_vertical_fov(plugin, aspect),
         aperture_radius=radius,
         focus_distance=distance if radius else None,

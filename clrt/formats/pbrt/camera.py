@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import atan, degrees, radians, tan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,7 +47,8 @@ def camera_of(entity: Entity, size: tuple[int, int], mirror: Doubles, notes: Not
         entity.ignore()
         remedy = "use perspective, orthographic or spherical"
         notes.instead(entity, what, remedy, f"a perspective one of {REALISTIC:g} degrees is used")
-    height = _height(entity, size, notes)
+    window = _window(entity, size, notes)
+    height = window.height
     radius, distance = entity.number("lensradius", 0.0) * across, entity.number("focaldistance", 1e6) * along
     camera = Camera(position=place.tolist(), look_at=(place + forward).tolist(), up=up.tolist())
     if entity.kind == "orthographic":
@@ -60,6 +62,8 @@ def camera_of(entity: Entity, size: tuple[int, int], mirror: Doubles, notes: Not
         raise entity.fault("fov", f"is {angle:g}", "write more than 0 and less than 180 degrees")
     return replace(
         camera,
+        lens_shift=window.shift,
+        pixel_aspect=window.pixel_aspect,
         fov_degrees=degrees(2 * atan(tan(radians(angle) / 2) * height / 2)),
         aperture_radius=radius,
         focus_distance=distance if radius else None,
@@ -76,21 +80,34 @@ def _round(entity: Entity, place: Doubles, axes: Doubles, notes: Notes) -> Camer
     return Camera(position=place.tolist(), look_at=seen.tolist(), up=axes[:, 1].tolist(), projection="equirectangular")
 
 
-def _height(entity: Entity, size: tuple[int, int], notes: Notes) -> float:
-    """Return the height of the screen window, which by default is 2 along the shorter side."""
+class _Window(NamedTuple):
+    """The screen window: its height, its center from the axis in widths and heights, and the pixels' aspect."""
+
+    height: float
+    shift: tuple[float, float]
+    pixel_aspect: float
+
+
+def _window(entity: Entity, size: tuple[int, int], notes: Notes) -> _Window:
+    """Return the screen window, which by default is 2 along the shorter side. Of an orthographic camera it is centered
+    and has the shape of the image."""
     aspect = size[0] / size[1]
     frame = entity.number("frameaspectratio", aspect)
     wide, high = (2 * frame, 2.0) if frame > 1 else (2.0, 2 / frame if frame > 0 else 2.0)
-    window = entity.rows("screenwindow", 4, "float", "integer")
-    if window is not None and len(window):
-        left, right, low, top = window[0].tolist()
+    shift, rows = (0.0, 0.0), entity.rows("screenwindow", 4, "float", "integer")
+    if rows is not None and len(rows):
+        left, right, low, top = rows[0].tolist()
         wide, high = right - left, top - low
         if not wide > 0 or not high > 0:
             raise entity.fault("screenwindow", "is empty", "write left, right, bottom and top")
-        if abs(left + right) > OFF * wide or abs(low + top) > OFF * high:
-            what, remedy = "screenwindow is not centered", "center it"
-            notes.instead(entity, what, remedy, "it is centered", "camera, shifted screen window")
-    if abs(wide / high / aspect - 1) > OFF:
+        shift = (left + right) / (2 * wide), (low + top) / (2 * high)
+    stretch = high * aspect / wide
+    if entity.kind != "orthographic":
+        return _Window(high, shift, stretch if abs(stretch - 1) > OFF else 1.0)
+    if max(map(abs, shift)) > OFF / 2:
+        what, remedy = "screenwindow is not centered", "center it"
+        notes.instead(entity, what, remedy, "it is centered", "camera, shifted screen window")
+    if abs(stretch - 1) > OFF:
         what, remedy = "its screen has not the shape of the image", "leave screenwindow and frameaspectratio out"
         notes.instead(entity, what, remedy, "its height is used", "camera that stretches the image")
-    return high
+    return _Window(high, (0.0, 0.0), 1.0)
