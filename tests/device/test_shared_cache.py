@@ -176,6 +176,7 @@ def test_everything_that_is_kept_is_of_a_kind(tmp_path: Path, monkeypatch: pytes
         "1.tuning.json",
         "2.driver.json",
         "1.loops.json",
+        "3.gpu.json",
         "reference-7.npz",
         "unfinished-1",
     ]
