@@ -37,6 +37,9 @@ def metadata_of(path: Path, name: str) -> str | None:
 
     if not path.is_file():
         return None
+    kind = FORMATS.get(path.suffix.lower())
+    if isinstance(kind, EncodedFormat):
+        return kind.metadata(path).get(name)
     with utf8_path(path) as file:
         opened = oiio.ImageInput.open(str(file))
     if not opened:
