@@ -31,7 +31,7 @@ def intrinsics_of(K: ArrayLike, size: tuple[int, int], first_pixel: float) -> di
     return {
         "fov_degrees": float(np.degrees(2 * np.arctan(height / 2 / fy))),
         "lens_shift": (float(0.5 - cx / width), float(cy / height - 0.5)),
-        "pixel_aspect": float(fx / fy),
+        "pixel_aspect": float(fy / fx),
         "skew": float(skew / fx),
     }
 

@@ -31,7 +31,7 @@ class Camera:
     - "perspective": pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
       `look_at`); `fov_degrees`: vertical, full angle. For calibrated cameras, see `from_matrix`: `lens_shift`, the
       image's center from the optical axis, to the right and up, in widths and heights of the image; `pixel_aspect`, a
-      pixel's height over its width in focal lengths, fx / fy; `skew`, K[0, 1] / K[0, 0].
+      pixel's width over its height, fy / fx; `skew`, K[0, 1] / K[0, 0].
     - "orthographic": parallel rays, an image `view_height` high (None: as the perspective view at `look_at`).
     - "equirectangular": all directions, in Environment's mapping for a view along +Z.
     """
@@ -75,7 +75,7 @@ class Camera:
         """Return the intrinsic matrix K, (3, 3), for images of `size` (width, height) in pixels; see `from_matrix`."""
         width, height = size
         fy = height / 2 / np.tan(np.radians(self.fov_degrees) / 2)
-        fx, less = fy * self.pixel_aspect, 0.5 - first_pixel
+        fx, less = fy / self.pixel_aspect, 0.5 - first_pixel
         center = width * (0.5 - self.lens_shift[0]) - less, height * (0.5 + self.lens_shift[1]) - less
         return np.array([[fx, fx * self.skew, center[0]], [0.0, fy, center[1]], [0.0, 0.0, 1.0]])
 
@@ -142,7 +142,7 @@ class Perspective(CameraType):
     def axes(camera: Camera, view: View) -> tuple[Doubles, Doubles, Doubles]:
         focus = (camera.focus_distance or view.distance) if camera.aperture_radius else 1.0
         extent = focus * np.tan(np.radians(camera.fov_degrees) / 2)
-        right = view.right * extent * view.width / view.height / camera.pixel_aspect
+        right = view.right * extent * view.width / view.height * camera.pixel_aspect
         up = extent * (view.up + camera.skew * view.right)
         across, along = camera.lens_shift
         return right, up, view.forward * focus + 2 * (across * right + along * up)

@@ -60,7 +60,7 @@ def test_rays_go_through_what_projects_to_their_pixel() -> None:
 
 @pytest.mark.parametrize("lens", [{}, {"aperture_radius": 0.05, "focus_distance": 9.0}], ids=["pinhole", "lens"])
 def test_spheres_are_seen_where_they_project(device: Device, lens: dict[str, Any]) -> None:
-    """Spheres smaller than a pixel, at pixel centers; with a lens in its plane of focus, which the shift leaves."""
+    """Spheres smaller than a pixel, at pixel centers; with a lens in its plane of focus, whatever the shift."""
     rng = np.random.default_rng(7)
     for _ in range(3):
         K, pose = calibrated(rng)

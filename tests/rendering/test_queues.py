@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +15,13 @@ from clrt.device.open import Device
 from clrt.errors import UsageError
 from clrt.rendering.accumulation import path_queues
 from clrt.rendering.compile.choices import Choices
-from clrt.rendering.compile.compile_scene import MEGAKERNEL, QUEUES
 from clrt.rendering.film.film import Film
 from clrt.rendering.renderer import Renderer
-from clrt.scene.model import Scene
 
 from ..covering import others
 from .pictures import session
 from .test_variants import everything, painted, planted, plastic_ball, sights
-from .test_wavefront import SPP, assert_same
+from .test_wavefront import assert_same, followed as followed_by
 
 SCENES = Path(__file__).parents[2] / "scenes"
 #: Between them: every stage, hits sorted or not, instances, textures, opacity, absorption, a light tree.
@@ -42,14 +41,7 @@ CASES = {
 }
 
 
-def followed(device: Device, paths: str, scene: Scene, *parts: int, **chosen: Any) -> Film:
-    """Return the film after as many samples per pixel as `parts` sum to, rendered one part after another."""
-    running = session(device, scene, lanes=1, paths=paths, **chosen)
-    for samples in parts or [SPP]:
-        for _ in running.render(samples):
-            pass
-    assert running.compiled.entry == {"lanes": MEGAKERNEL, "queues": QUEUES}[paths]
-    return running.film()
+followed = partial(followed_by, lanes=1)
 
 
 def assert_equal(device: Device, queues: Film, lanes: Film) -> None:

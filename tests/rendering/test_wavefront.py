@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clrt.device.device_info import Paths
 from clrt.device.open import Device
 from clrt.errors import UsageError
 from clrt.rendering.compile.choices import Choices
-from clrt.rendering.compile.compile_scene import MEGAKERNEL, WAVEFRONT
+from clrt.rendering.compile.compile_scene import PATHS
 from clrt.rendering.film.film import Film
 from clrt.rendering.film.tiles import tile_sums
 from clrt.rendering.renderer import Renderer
@@ -37,13 +38,13 @@ PLASTIC = plastic_ball()
 OTHERS = {"everything": everything(), "lens": dict(sights(everything()))["lens"]}
 
 
-def followed(device: Device, paths: str, scene: Scene, *parts: int, **chosen: Any) -> Film:
+def followed(device: Device, paths: Paths, scene: Scene, *parts: int, lanes: int = 8, **chosen: Any) -> Film:
     """Return the film after as many samples per pixel as `parts` sum to, rendered one part after another."""
-    running = session(device, scene, lanes=8, paths=paths, **chosen)
+    running = session(device, scene, lanes=lanes, paths=paths, **chosen)
     for samples in parts or [SPP]:
         for _ in running.render(samples):
             pass
-    assert running.compiled.entry == {"lanes": MEGAKERNEL, "waves": WAVEFRONT}[paths]
+    assert running.compiled.entry == PATHS[paths]
     return running.film()
 
 

@@ -25,7 +25,7 @@ def write_archive(path: Path, results: Mapping[str, Any], page: str | None = Non
 
 
 def read_archive(path: Path) -> dict[str, Any] | None:
-    """Return the results of an earlier run, or None if there is no such file. Raises UsageError if it is another."""
+    """Return the results of an earlier run, or None if there is no such file. Raises UsageError for other files."""
     try:
         with ZipFile(path) as archive:
             results: dict[str, Any] = json.loads(archive.read(DATA))

@@ -22,7 +22,7 @@ from .request import Item, Request, Row
 SIZES, QUICK_SIZES = (10_000, 100_000, 1_000_000, 3_000_000, 10_000_000), (300,)
 #: Most triangles for the builders in numpy, which do not depend on the device.
 MOST_IN_NUMPY = 100_000
-#: Builds after the first one, and the seconds after which there is no other.
+#: Maximum builds after the first one, and seconds after which no further one begins.
 ROUNDS, SECONDS = 5, 2.0
 
 

@@ -19,8 +19,8 @@ class MissCurve:
     """Misses of caches of every size with least-recently-used replacement, for a stream that is taken to repeat.
 
     late: the fraction of accesses that come later than w = 0, 1 … after the last use of their line; distinct: the mean
-    number of lines among w = 1, 2 … accesses, which grows at that rate. A cache holds the lines of the largest w at
-    which that is no more than its capacity.
+    number of lines among w = 1, 2 … accesses, which grows at that rate. A cache holds the lines of the largest w whose
+    mean number of lines is at most its capacity.
     """
 
     late: NDArray[np.float64]

@@ -1,6 +1,6 @@
 """Rays and visits of recorded work-items, as arrays.
 
-A ray's traversal proceeds in turns, the iterations of the traversal's outer loop: one node, or one leaf of bvh2, and
+A turn is an iteration of the outer loop of a ray's traversal: one node, or one leaf of bvh2, and
 the primitives tested after it.
 """
 

@@ -49,7 +49,7 @@ def _sampled(query: RayQuery, kind: Workload, rays: int) -> Sample:
 
 def sampled_paths(device: Device, scene: Scene, layout: str, size: int, paths: int) -> Sample:
     """Return a sample of about `paths` paths of an image of size² pixels, in whole blocks. Raises UsageError if
-    size is no multiple of a block's width."""
+    size is not a multiple of a block's width."""
     if size % (BLOCK_TILES * TILE):
         raise UsageError(f"size {size}: give a multiple of {BLOCK_TILES * TILE} pixels")
     across = size // TILE

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from math import exp, log
+from queue import Empty
 from statistics import fmean
-from typing import IO
 
 from ...device.device_info import DeviceInfo, Tuning
 from ...device.open import Device
 from ...device.programs.child_process import end_child, last_line, start_child, told_end
+from ...device.programs.child_results import child_results
 from ...errors import DeviceError
 from .candidates import candidates
 
 TRIAL = "clrt.bench.tuning.trial"
 #: Factor by which a candidate must be faster than the first, the one expected to be best.
 TELLING = 1.03
-#: Seconds between two looks at the child.
-POLL = 0.05
+#: Seconds for the child to exit after its last result.
+EXIT = 10.0
 
 
 @dataclass(frozen=True)
@@ -67,34 +67,20 @@ def _run(info: DeviceInfo, left: Sequence[Tuning], each: float) -> tuple[dict[Tu
 
     each: seconds that a candidate may take.
     """
-    with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
+    least: dict[Tuning, dict[str, float]] = {}
+    deadline = time.monotonic() + each
+    with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as errors:
         given.write(json.dumps([asdict(candidate) for candidate in left]).encode())
         given.seek(0)
-        child = start_child(TRIAL, info.id, output, errors, given=given)
+        child = start_child(TRIAL, info.id, subprocess.PIPE, errors, given=given)
         try:
-            problem = _problem(child, output, errors, each)
+            for row in child_results(child, lambda: time.monotonic() >= deadline):
+                seconds = least.setdefault(Tuning(**row["tuning"]), row["seconds"])
+                seconds.update((scene, min(took, seconds[scene])) for scene, took in row["seconds"].items())
+                deadline = time.monotonic() + each
+            code = child.wait(EXIT)
+            return least, f"{told_end(code)}{last_line(errors)}" if code else "it gave no result"
+        except (Empty, subprocess.TimeoutExpired):
+            return least, f"it did not finish in {each:.3g} s"
         finally:
             end_child(child)
-        output.seek(0)
-        rows = [json.loads(line) for line in output.read().splitlines() if line.endswith(b"}}")]
-    least: dict[Tuning, dict[str, float]] = {}
-    for row in rows:
-        seconds = least.setdefault(Tuning(**row["tuning"]), row["seconds"])
-        seconds.update((scene, min(took, seconds[scene])) for scene, took in row["seconds"].items())
-    return least, problem
-
-
-def _problem(child: subprocess.Popen[str], output: IO[bytes], errors: IO[bytes], each: float) -> str:
-    """Wait until the child ends or a candidate takes longer than `each` seconds; return what went wrong, if anything.
-
-    The size of the output shows its progress: reading it would move the child's position in the file.
-    """
-    size, deadline = 0, time.monotonic() + each
-    while time.monotonic() < deadline:
-        try:
-            code = child.wait(POLL)
-            return f"{told_end(code)}{last_line(errors)}" if code else "it gave no result"
-        except subprocess.TimeoutExpired:
-            if (now := os.fstat(output.fileno()).st_size) > size:
-                size, deadline = now, time.monotonic() + each
-    return f"it did not finish in {each:.3g} s"

@@ -101,7 +101,7 @@ def _window(entity: Entity, size: tuple[int, int], notes: Notes) -> _Window:
         if not wide > 0 or not high > 0:
             raise entity.fault("screenwindow", "is empty", "write left, right, bottom and top")
         shift = (left + right) / (2 * wide), (low + top) / (2 * high)
-    stretch = high * aspect / wide
+    stretch = wide / (high * aspect)
     if entity.kind != "orthographic":
         return _Window(high, shift, stretch if abs(stretch - 1) > OFF else 1.0)
     if max(map(abs, shift)) > OFF / 2:
