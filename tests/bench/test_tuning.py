@@ -88,16 +88,17 @@ def test_a_trial_survives_its_driver(
     """A driver that fails after some launches in every process: candidates before it count, the others fail."""
     library = compile_library(FAULTY, tmp_path / "libfaulty.so", "-ldl")
     first = tune(device, 100.0).seconds  # compiles
-    settings = {"LD_PRELOAD": str(library), "FAULT": kind, "FAULT_QUEUE": "0", "FAULT_AFTER": "30"}
-    for name, value in settings.items():
+    for name, value in {"LD_PRELOAD": str(library), "FAULT": kind, "FAULT_QUEUE": "0"}.items():
         monkeypatch.setenv(name, value)
-    told: list[str] = []
-    try:
-        found = tune(device, 24.0, told.append)
-    except DeviceError as error:  # even the first candidate takes more launches
-        assert "cannot be tuned" in str(error)
-        return
-    assert found.failures and set(found.seconds) | set(found.failures) == set(first)
+    for after in (150, 250, 400, 700):  # enough for the first candidate, not for all: that depends on the machine
+        monkeypatch.setenv("FAULT_AFTER", str(after))
+        told: list[str] = []
+        try:
+            found = tune(device, 24.0, told.append)
+            break
+        except DeviceError as error:
+            assert "cannot be tuned" in str(error) and len(told) == len(first)
+    assert found.seconds and found.failures and set(found.seconds) | set(found.failures) == set(first)
     assert len(told) == len(found.failures)
     assert all(("signal 6" if kind == "crashes" else "did not finish") in each for each in found.failures.values())
 
