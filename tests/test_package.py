@@ -41,6 +41,16 @@ def test_wheel_holds_every_module_kernel_and_scene(tmp_path: Path) -> None:
         if file.is_file() and file.suffix not in (".md", ".py")
     }
     assert packed == modules | kernels | scenes
+    zipfile.ZipFile(wheel).extractall(tmp_path / "installed")
+    names = "print(*(path.stem for path in shipped_scenes()))"
+    result = subprocess.run(
+        [sys.executable, "-c", f"from clrt.bench.gpu.shipped_scenes import shipped_scenes; {names}"],
+        cwd=tmp_path / "installed",
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert set(result.stdout.split()) == {path.stem for path in (ROOT / "scenes").glob("*.toml")}
 
 
 def test_version_is_the_package_s() -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
+
+PACKAGE = Path(__file__).parents[2]
 
 
 def shipped_scenes() -> list[Path]:
     """Return the scene files next to clrt in a source tree, else those of the installed package, by name."""
-    beside = Path(__file__).parents[3] / "scenes"
-    folder = beside if (beside / "cornell.toml").is_file() else Path(str(files("clrt.scenes")))
+    beside = PACKAGE.parent / "scenes"
+    folder = beside if (beside / "cornell.toml").is_file() else PACKAGE / "scenes"
     return sorted(folder.glob("*.toml"))
