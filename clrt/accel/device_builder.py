@@ -183,7 +183,7 @@ def _plan(work: DataParallel, shape: BuilderLayout, primitives: Primitives, tree
     plans, leaves = work.empty(np.uint32, tree.count), work.empty(np.float32, 2 * tree.count)
     costs = work.empty(np.float32, tree.count * (shape.children - 1))
     for first, count in zip(itertools.accumulate(tree.rounds, initial=0), tree.rounds):
-        work.run("plan_nodes", count, *primitives.arguments, tree.nodes, first, root, world[0], plans, costs, leaves)
+        work.run_each("plan_nodes", count, *primitives.arguments, tree.nodes, first, root, world[0], plans, costs, leaves)
     work.free(costs, leaves)
     return _Plan(primitives, tree, plans, float(area[0]))
 
@@ -197,7 +197,7 @@ def _open(work: DataParallel, shape: BuilderLayout, plan: _Plan) -> tuple[list[_
     while below := levels[-1].records[0]:
         above, places = levels[-1], work.empty(np.uint32, 3 * below)
         children, waiting = work.empty(np.int32, below * shape.children), work.empty(np.int32, below)
-        work.run("open_level", above.count, *plan.arguments, *above.arrays, below, children, places, waiting, most)
+        work.run_each("open_level", above.count, *plan.arguments, *above.arrays, below, children, places, waiting, most)
         work.scan(places, below, 3)
         nodes, triangles, spheres = work.sums(3)
         levels.append(_Level(below, children, places, waiting, (nodes, triangles, spheres)))
@@ -211,11 +211,10 @@ def _write(work: DataParallel, shape: BuilderLayout, plan: _Plan, levels: list[_
     each, besides = shape.records
     counts = sum(sizes) * each + besides, sum(r[1] for r in records), sum(r[2] for r in records)
     arrays = work.empty(shape.node, counts[0]), work.empty(shape.leaf, counts[1]), work.empty(LEAF_SPHERE, counts[2])
-    blocks = max(map(work.number, sizes))
-    areas = work.zeros(np.float32, blocks)
+    visited = work.empty(np.float32, sum(sizes))
     node = triangle = sphere = 0
     for level in levels:
-        work.run(
+        work.run_each(
             "write_level",
             level.count,
             *plan.arguments,
@@ -226,12 +225,15 @@ def _write(work: DataParallel, shape: BuilderLayout, plan: _Plan, levels: list[_
             triangle,
             sphere,
             *arrays,
-            areas,
+            visited,
         )
         node, triangle, sphere = node + level.count, triangle + level.records[1], sphere + level.records[2]
         work.free(*level.arrays)
-    area = plan.area + float(work.download(areas, np.float32, blocks).sum(dtype=np.float64))
-    work.free(areas, plan.tree.nodes, plan.plans, plan.primitives.shapes, plan.primitives.ids)
+    tiles = work.tiles(sum(sizes))
+    areas = work.empty(np.float32, tiles)
+    work.run_tiles("sum_areas", sum(sizes), visited, areas)
+    area = plan.area + float(work.download(areas, np.float32, tiles).sum(dtype=np.float64))
+    work.free(visited, areas, plan.tree.nodes, plan.plans, plan.primitives.shapes, plan.primitives.ids)
     cost = area / plan.area if plan.area else float(sum(sizes) + counts[1] + counts[2])
     level_sizes = [1] * (besides > 0) + [each * size for size in sizes]
     return DeviceTree(arrays, counts, sum(level_sizes), len(sizes), stack, cost, level_sizes, work.peak_bytes)

@@ -47,7 +47,7 @@ def sort_primitives(work: DataParallel, triangles: Triangles, spheres: FloatArra
     try:
         ids = _morton_order(work, scene, count)
         shapes = work.empty(np.float32, SHAPE * count)
-        work.run("gather_shapes", count, *scene, ids, shapes)
+        work.run_each("gather_shapes", count, *scene, ids, shapes)
     finally:
         work.finish()
     work.free(*scene[:2])
@@ -59,7 +59,7 @@ def _morton_order(work: DataParallel, scene: Scene, count: int) -> cl.Buffer:
     low, extent = _centre_bounds(work, scene, count)
     scale = min(CELLS / extent, float(np.finfo(np.float32).max)) if extent > 0 else 0.0
     codes, ids = work.empty(np.uint64, count), work.empty(np.uint32, count)
-    work.run("morton_codes", count, *scene, *low.tolist(), scale, codes, ids)
+    work.run_each("morton_codes", count, *scene, *low.tolist(), scale, codes, ids)
     codes, ids = radix_sort(work, codes, ids, count)
     work.free(codes)
     return ids
@@ -67,13 +67,13 @@ def _morton_order(work: DataParallel, scene: Scene, count: int) -> cl.Buffer:
 
 def radix_sort(work: DataParallel, codes: cl.Buffer, values: cl.Buffer, count: int) -> tuple[cl.Buffer, cl.Buffer]:
     """Sort codes, uint64 below 2^CODE_BITS, with their values, uint32; stable. Frees the given arrays."""
-    blocks = work.number(count)
-    digits = work.empty(np.uint32, blocks << DIGIT_BITS)
+    tiles = work.tiles(count)
+    digits = work.empty(np.uint32, tiles << DIGIT_BITS)
     other_codes, other_values = work.empty(np.uint64, count), work.empty(np.uint32, count)
     for shift in range(0, CODE_BITS, DIGIT_BITS):
-        work.run("count_digits", count, codes, shift, digits)
-        work.scan(digits, blocks << DIGIT_BITS)
-        work.run("move_digits", count, codes, values, shift, digits, other_codes, other_values)
+        work.run_tiles("count_digits", count, codes, shift, digits)
+        work.scan(digits, tiles << DIGIT_BITS)
+        work.run_tiles("move_digits", count, codes, values, shift, digits, other_codes, other_values)
         codes, values, other_codes, other_values = other_codes, other_values, codes, values
     work.free(other_codes, other_values, digits)
     return codes, values
@@ -81,10 +81,10 @@ def radix_sort(work: DataParallel, codes: cl.Buffer, values: cl.Buffer, count: i
 
 def _centre_bounds(work: DataParallel, scene: Scene, count: int) -> tuple[FloatArray, float]:
     """Return twice the minimum of the centres (3,) float32, and twice their largest extent."""
-    blocks = work.number(count)
-    partial = work.empty(np.float32, 6 * blocks)
-    work.run("centre_bounds", count, *scene, partial)
-    bounds = work.download(partial, np.float32, 6 * blocks).reshape(-1, 6)
+    tiles = work.tiles(count)
+    partial = work.empty(np.float32, 6 * tiles)
+    work.run_tiles("centre_bounds", count, *scene, partial)
+    bounds = work.download(partial, np.float32, 6 * tiles).reshape(-1, 6)
     work.free(partial)
     low, high = bounds[:, :3].min(axis=0), bounds[:, 3:].max(axis=0)
     return low, float((high - low).max())

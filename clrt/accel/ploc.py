@@ -41,17 +41,17 @@ def cluster(work: DataParallel, primitives: Primitives) -> BinaryTree:
     clusters = primitives.count
     now, later = _columns(work, clusters), None
     nearest, nodes = work.empty(np.int8, clusters), work.empty(BINARY_NODE, clusters - 1)
-    work.run("first_clusters", clusters, *primitives.arguments, *now)
+    work.run_each("first_clusters", clusters, *primitives.arguments, *now)
     rounds: list[int] = []
     forced = False
     while clusters > FEW:
-        work.run("nearest_clusters", clusters, *now, int(forced), nearest)
-        offsets = work.empty(np.uint32, 2 * work.number(clusters))
-        work.run("count_pairs", clusters, nearest, offsets)
-        work.scan(offsets, work.number(clusters), 2)
+        work.run_each("nearest_clusters", clusters, *now, int(forced), nearest)
+        offsets = work.empty(np.uint32, 2 * work.tiles(clusters))
+        work.run_tiles("count_pairs", clusters, nearest, offsets)
+        work.scan(offsets, work.tiles(clusters), 2)
         stay, joined = work.sums(2)
         later = later or _columns(work, stay)
-        work.run("join_pairs", clusters, nearest, offsets, work.totals, *now, *later, nodes, sum(rounds))
+        work.run_tiles("join_pairs", clusters, nearest, offsets, work.totals, *now, *later, nodes, sum(rounds))
         work.free(offsets)
         forced = joined * SLOW < clusters
         rounds.append(joined)

@@ -60,7 +60,7 @@ class Refitter:
         end = sum(self._levels)
         for level in reversed(range(len(self._levels))):
             first = end - self._levels[level]
-            self._work.run(
+            self._work.run_each(
                 "refit_level",
                 self._levels[level],
                 first + self._recipe.gap * (level > 0),

@@ -79,7 +79,7 @@ def _level(work: DataParallel, primitives: Primitives, tree: BinaryTree) -> Leve
     work.free(tree.nodes, listed)
     sizes.reverse()
     for first, count in zip(np.cumsum([0, *sizes]), sizes):
-        work.run("refit_nodes", count, *primitives.arguments, nodes, int(first), levels)
+        work.run_each("refit_nodes", count, *primitives.arguments, nodes, int(first), levels)
     return LevelOrderBvh(BinaryTree(nodes, sizes), parents, levels)
 
 
@@ -89,8 +89,8 @@ def _move(work: DataParallel, primitives: Primitives, leveled: LevelOrderBvh, de
     places, count = tree.count + primitives.count, 2 * -(-tree.count // TOPMOST)
     arguments = tree.nodes, leveled.parents, leveled.levels, tree.count - 1
     moves, gains, owners = work.empty(MOVE, count), work.zeros(np.uint32, places), work.zeros(np.uint32, places)
-    work.run("find_moves", count, *primitives.arguments, *arguments, deepest, moves)
+    work.run_each("find_moves", count, *primitives.arguments, *arguments, deepest, moves)
     for step in range(ROUNDS * STEPS):
-        work.run("match_moves", count, *arguments, step % STEPS, moves, gains, owners)
-    work.run("make_moves", count, *arguments, moves)
+        work.run_each("match_moves", count, *arguments, step % STEPS, moves, gains, owners)
+    work.run_each("make_moves", count, *arguments, moves)
     work.free(moves, gains, owners)

@@ -15,6 +15,7 @@ kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
     FOR_NODES {
         uint children = 2 * (first_node + i + 1);
         OPEN_NODE
+        float areas = 0.0f;
         Box around = NO_BOX;
         for (int s = 0; s < CHILDREN; ++s) {
             Content content = contents[s];
@@ -29,6 +30,6 @@ kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
             write_node(nodes, around, 2, 0);
             write_node(nodes + 1, NO_BOX, 0, 0);
         }
+        visited[first_node + i] = areas;
     }
-    ADD_AREAS
 }

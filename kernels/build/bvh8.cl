@@ -5,6 +5,7 @@ kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
     FOR_NODES {
         global Node *node = nodes + first_node + i;
         OPEN_NODE
+        float areas = 0.0f;
         for (int s = 0; s < CHILDREN; ++s) {
             Content content = contents[s];
             Box box = NO_BOX;
@@ -20,6 +21,6 @@ kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
             node->child[s] = child;
             node->pad[s] = 0;
         }
+        visited[first_node + i] = areas;
     }
-    ADD_AREAS
 }

@@ -24,6 +24,7 @@ kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
     FOR_NODES {
         global Node *node = nodes + first_node + i;
         OPEN_NODE
+        float areas = 0.0f;
         float lo[3][CHILDREN], hi[3][CHILDREN];
         Box around = NO_BOX;
         bool spheres = false;
@@ -51,6 +52,6 @@ kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
         write_axis(node, 0, lo[0], hi[0], around.lo.x, around.hi.x);
         write_axis(node, 1, lo[1], hi[1], around.lo.y, around.hi.y);
         write_axis(node, 2, lo[2], hi[2], around.lo.z, around.hi.z);
+        visited[first_node + i] = areas;
     }
-    ADD_AREAS
 }

@@ -1,5 +1,6 @@
 // The records of leaves: packs of eight triangles, single triangles, spheres.
 #include "build/open.cl"
+#include "build/tiles.cl"
 
 #if SPHERES
 static inline void write_spheres(const Primitives *primitives, const int *members, int count, global LeafSphere *leaf) {
@@ -41,23 +42,20 @@ static inline float visited_area(Box box, Content content) {
 }
 
 // The indices of the next wide node of the level below, and of the next records of triangles and spheres. Levels start
-// at first_node and next_node, the records of this one at first_triangle and first_sphere. work: areas by block, summed
-// over levels.
+// at first_node and next_node, the records of this one at first_triangle and first_sphere. visited: by node.
 typedef struct { uint node, triangle, sphere; } Places;
 
 #define LEVEL_PARAMETERS PRIMITIVE_PARAMETERS, global const BinaryNode *binary, global const uint *plans, \
                          global const int *slots, global const uint *places, uint first_node, uint next_node, \
                          uint first_triangle, uint first_sphere, global Node *nodes, global Triangles *triangles, \
-                         global LeafSphere *leaf_spheres, global float *work
+                         global LeafSphere *leaf_spheres, global float *visited
 #define PLACES(i) {next_node + places[i], first_triangle + places[count + (i)], first_sphere + places[2 * count + (i)]}
 
-// The nodes i of a level in this work-item's block; `areas` sums their visited areas, which ADD_AREAS stores.
+// The nodes i of a level in this work-item's block.
 #define FOR_NODES \
     Primitives primitives = PRIMITIVE_ARGUMENTS; \
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count; \
-    float areas = 0.0f; \
     for (uint i = first; i < end; ++i)
-#define ADD_AREAS if (first < count) work[get_global_id(0)] += areas;
 
 // The contents of the slots of node i, and the indices of what they refer to.
 #define OPEN_NODE \
@@ -81,4 +79,17 @@ static inline uint fill_slot(const Primitives *primitives, global const BinaryNo
 #endif
     *(content.sphere ? &next->sphere : &next->triangle) += content.units;
     return first;
+}
+
+// In each tile, the sum of the areas of nodes.
+kernel void sum_areas(uint count, uint block, global const float *visited, global float *sums) {
+    local float part[TILE_ITEMS];
+    TILE_RANGE
+    float sum = 0.0f;
+    for (uint i = first + me; i < end; i += items) sum += visited[i];
+    part[me] = sum;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (me > 0) return;
+    for (uint k = 1; k < items; ++k) sum += part[k];
+    sums[tile] = sum;
 }

@@ -1,6 +1,7 @@
 // Sort primitives along a space-filling curve by the Morton codes of their boxes' centres, 21 bits per axis.
 #include "build/primitives.cl"
 #include "build/sort.cl"
+#include "build/tiles.cl"
 #include "core/mask.cl"
 
 #define SHAPES_AHEAD 16   // prefetch distance, in primitives
@@ -15,17 +16,22 @@ static inline global const float *scene_shape(global const float *triangles, glo
 
 static inline float3 twice_centre(Box box) { return box.lo + box.hi; }
 
-// Bounds of twice the centres in each block: low in partial[0 … 2], high in partial[3 … 5].
+// Bounds of twice the centres in each tile: low in partial[0 … 2], high in partial[3 … 5].
 kernel void centre_bounds(uint count, uint block, SCENE_PARAMETERS, global float *partial) {
-    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    if (first >= count) return;
+    local float lows[3 * TILE_ITEMS], highs[3 * TILE_ITEMS];
+    TILE_RANGE
     Box bounds = NO_BOX;
-    for (uint i = first; i < end; ++i) {
+    for (uint i = first + me; i < end; i += items) {
         float3 centre = twice_centre(shape_box(scene_shape(triangles, spheres, triangle_count, i), i >= triangle_count));
         bounds = box_union(bounds, (Box){centre, centre});
     }
-    vstore3(bounds.lo, 2 * get_global_id(0), partial);
-    vstore3(bounds.hi, 2 * get_global_id(0) + 1, partial);
+    vstore3(bounds.lo, me, lows);
+    vstore3(bounds.hi, me, highs);
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (me > 0) return;
+    for (uint k = 1; k < items; ++k) bounds = box_union(bounds, (Box){vload3(k, lows), vload3(k, highs)});
+    vstore3(bounds.lo, 2 * tile, partial);
+    vstore3(bounds.hi, 2 * tile + 1, partial);
 }
 
 // Spread the 21 bits of x, three places apart.

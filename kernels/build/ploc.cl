@@ -7,6 +7,7 @@
 // p. RADIUS columns at infinite distance pad both ends. A round that merges fewer than one cluster in SLOW is followed
 // by one that merges all neighbours, so that depth and time are bounded for any input, nested boxes included.
 #include "build/primitives.cl"
+#include "build/tiles.cl"
 #include "core/mask.cl"
 
 #define RADIUS 8
@@ -98,37 +99,26 @@ static inline int partner(global const char *nearest, uint i) {
     return nearest[i + step] == -step ? step : 0;
 }
 
-// Of the clusters first … end − 1, x: how many remain; y: pairs that are merged.
-static inline uint2 count_of(global const char *nearest, uint first, uint end) {
-    uint2 counts = {0, 0};
-    for (uint i = first; i < end; ++i) {
-        int step = partner(nearest, i);
-        counts += (uint2)(step >= 0, step > 0);
+// Write cluster i, merged with that `step` places on if `step` is above 0, to `place` in the next round; the new node is
+// `node`.
+static inline void join(uint i, int step, global const float *clusters, uint pitch, global float *next, uint next_pitch,
+                        uint place, global BinaryNode *nodes, uint node) {
+    Box box = cluster_box(clusters, pitch, i);
+    int left = cluster_node(clusters, pitch, i);
+    if (step > 0) {
+        int right = cluster_node(clusters, pitch, i + step), size = (left & MANY) + (right & MANY);
+        box = box_union(box, cluster_box(clusters, pitch, i + step));
+        vstore3(box.lo, 0, nodes[node].lo);
+        vstore3(box.hi, 0, nodes[node].hi);
+        nodes[node].left = NODE(left);
+        nodes[node].right = NODE(right);
+        left = CLUSTER(node, size < MANY ? size : MANY);
     }
-    return counts;
+    put_cluster(next, next_pitch, place, box, left);
 }
 
-// Write those of the clusters first … end − 1 that remain to `place` and on, in the next round; new nodes are numbered
-// from `node` on.
-static inline void join(global const char *nearest, uint first, uint end, global const float *clusters, uint pitch,
-                        global float *next, uint next_pitch, uint place, global BinaryNode *nodes, uint node) {
-    for (uint i = first; i < end; ++i) {
-        int step = partner(nearest, i);
-        if (step < 0) continue;
-        Box box = cluster_box(clusters, pitch, i);
-        int left = cluster_node(clusters, pitch, i);
-        if (step > 0) {
-            int right = cluster_node(clusters, pitch, i + step), size = (left & MANY) + (right & MANY);
-            box = box_union(box, cluster_box(clusters, pitch, i + step));
-            vstore3(box.lo, 0, nodes[node].lo);
-            vstore3(box.hi, 0, nodes[node].hi);
-            nodes[node].left = NODE(left);
-            nodes[node].right = NODE(right);
-            left = CLUSTER(node++, size < MANY ? size : MANY);
-        }
-        put_cluster(next, next_pitch, place++, box, left);
-    }
-}
+// Of a cluster, x: whether it remains; y: whether it is the first of a pair that is merged.
+static inline uint2 fate(int step) { return (uint2)(step >= 0, step > 0); }
 
 kernel void nearest_clusters(uint count, uint block, global const float *clusters, uint pitch, uint forced,
                              global char *nearest) {
@@ -136,24 +126,43 @@ kernel void nearest_clusters(uint count, uint block, global const float *cluster
     for (uint i = first; i < end; ++i) nearest[i] = nearest_of(clusters, pitch, count, forced, i);
 }
 
-// In each block: counts[block] clusters that remain, counts[blocks + block] pairs that are merged.
+// In each tile: counts[tile] clusters that remain, counts[tiles + tile] pairs that are merged.
 kernel void count_pairs(uint count, uint block, global const char *nearest, global uint *counts) {
-    uint me = get_global_id(0), blocks = (count + block - 1) / block;
-    if (me >= blocks) return;
-    uint2 mine = count_of(nearest, me * block, me * block + block < count ? me * block + block : count);
-    counts[me] = mine.x;
-    counts[blocks + me] = mine.y;
+    local uint2 counted[TILE_ITEMS];
+    TILE_RANGE
+    uint2 mine = {0, 0};
+    for (uint i = first + me; i < end; i += items) mine += fate(partner(nearest, i));
+    counted[me] = mine;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (me > 0) return;
+    for (uint k = 1; k < items; ++k) mine += counted[k];
+    counts[tile] = mine.x;
+    counts[tiles + tile] = mine.y;
 }
 
 // Write the clusters of the next round; new nodes are numbered from `node` on.
 kernel void join_pairs(uint count, uint block, global const char *nearest, global const uint *offsets,
                        global const uint *totals, global const float *clusters, uint pitch, global float *next,
                        uint next_pitch, global BinaryNode *nodes, uint node) {
-    uint me = get_global_id(0), blocks = (count + block - 1) / block;
-    if (me >= blocks) return;
-    if (me == 0) put_margins(next, next_pitch, totals[0]);
-    join(nearest, me * block, me * block + block < count ? me * block + block : count, clusters, pitch, next,
-         next_pitch, offsets[me], nodes, node + offsets[blocks + me]);
+    local uint2 fates[TILE_ITEMS];
+    TILE_RANGE
+    if (tile == 0 && me == 0) put_margins(next, next_pitch, totals[0]);
+    uint place = offsets[tile];
+    node += offsets[tiles + tile];
+    for (uint start = first; start < end; start += items) {
+        uint i = start + me;
+        int step = i < end ? partner(nearest, i) : -1;
+        fates[me] = fate(step);
+        barrier(CLK_LOCAL_MEM_FENCE);
+        uint2 before = {place, node};
+        for (uint k = 0; k < items; ++k) {
+            before += k < me ? fates[k] : (uint2)(0, 0);
+            place += fates[k].x;
+            node += fates[k].y;
+        }
+        if (step >= 0) join(i, step, clusters, pitch, next, next_pitch, before.x, nodes, before.y);
+        barrier(CLK_LOCAL_MEM_FENCE);
+    }
 }
 
 // All further rounds in one work-group: with few clusters a round is faster than the launches of its kernels. rounds[0]
@@ -167,9 +176,11 @@ kernel void last_rounds(uint count, uint forced, global char *nearest, global fl
         uint end = first + share < count ? first + share : count;
         for (uint i = first; i < end; ++i) nearest[i] = nearest_of(clusters, pitch, count, forced, i);
         barrier(CLK_GLOBAL_MEM_FENCE);
-        counts[me] = count_of(nearest, first, end);
+        uint2 mine = {0, 0};
+        for (uint i = first; i < end; ++i) mine += fate(partner(nearest, i));
+        counts[me] = mine;
         barrier(CLK_LOCAL_MEM_FENCE);
-        uint2 before = {0, 0}, all = {0, 0};
+        uint2 before = {0, node}, all = {0, 0};
         for (uint i = 0; i < items; ++i) {
             before += i < me ? counts[i] : (uint2)(0, 0);
             all += counts[i];
@@ -178,7 +189,11 @@ kernel void last_rounds(uint count, uint forced, global char *nearest, global fl
             put_margins(next, next_pitch, all.x);
             rounds[++made] = all.y;
         }
-        join(nearest, first, end, clusters, pitch, next, next_pitch, before.x, nodes, node + before.y);
+        for (uint i = first; i < end; ++i) {
+            int step = partner(nearest, i);
+            if (step >= 0) join(i, step, clusters, pitch, next, next_pitch, before.x, nodes, before.y);
+            before += fate(step);
+        }
         barrier(CLK_GLOBAL_MEM_FENCE | CLK_LOCAL_MEM_FENCE);
         forced = all.y * SLOW < count;
         count = all.x;

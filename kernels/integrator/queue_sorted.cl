@@ -1,4 +1,4 @@
-// Order of the stage `shade` in scenes with several material types: by kind, i.e. misses and the material types, so that
+// Order of the stage `shade` in scenes with microfacet materials: by kind, i.e. misses and the material types, so that
 // a work-group shades hits of one kind.
 //
 // block_count(q, depth)                the number of blocks, of one entry per work-item of a group, to shade

@@ -1,4 +1,4 @@
-// Order of the stage `shade` in scenes with one material type: that of the queue. See integrator/queue_sorted.cl.
+// Order of the stage `shade` in scenes without microfacet materials: that of the queue. See integrator/queue_sorted.cl.
 static inline uint block_count(const Queues *q, int depth) {
     return (*queued_paths(q, depth) + (uint)get_local_size(0) - 1) / (uint)get_local_size(0);
 }

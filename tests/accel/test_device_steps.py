@@ -99,8 +99,9 @@ def test_no_wide_tree_over_the_same_clusters_costs_less(device: Device, layout: 
 
 @pytest.mark.parametrize("count", [1, 200, 5000])
 @pytest.mark.parametrize("bits", [0, 1, 20, CODE_BITS])
-def test_codes_are_sorted_and_equal_ones_stay_in_order(device: Device, bits: int, count: int) -> None:
-    work = DataParallel(device, program_source(SHAPES["bvh8"], True, False, False))
+@pytest.mark.parametrize("groups", [False, True])
+def test_codes_are_sorted_and_equal_ones_stay_in_order(device: Device, groups: bool, bits: int, count: int) -> None:
+    work = DataParallel(like_gpu(device) if groups else device, program_source(SHAPES["bvh8"], True, False, False))
     codes = np.random.default_rng(bits).integers(1 << bits, size=count, dtype=np.uint64)
     sorted_codes, values = radix_sort(work, work.upload(codes), work.upload(np.arange(count, dtype=np.uint32)), count)
     order = np.argsort(codes, kind="stable")

@@ -74,6 +74,8 @@ COLUMNS = {
         Column("seconds", "seconds", ".4g"),
         Column("first call", "first_seconds", ".4g"),
         Column("Mtriangles/s", "mtriangles", ".4g"),
+        Column("of it upload", "upload_seconds", ".4g"),
+        Column("Mtriangles/s without", "mtriangles_uploaded", ".4g"),
         Column("SAH cost", "sah_cost", ".2f"),
         Column("B/triangle", "bytes_per_triangle", ".1f"),
         Column("peak B/triangle", "peak_bytes_per_triangle", ".1f"),

@@ -1,4 +1,4 @@
-"""Data-parallel primitives: kernels over `count` items, with a block of consecutive items per work-item."""
+"""Data-parallel primitives: kernels over `count` items, with one of them or a block of consecutive ones per work-item."""
 
 from __future__ import annotations
 
@@ -26,14 +26,17 @@ ITEM_TURNS = 1024
 LAUNCH_ITEMS = {"cpu": 1 << 20, "gpu": 1 << 17}
 #: Work-items that scan cooperatively where that pays, as in build/scan.cl, and the number of elements per work-group.
 SCAN_ITEMS, SCAN_PART = 256, 8192
+#: Consecutive items per work-group of kernels whose work-items share them.
+TILE = 2048
 
 
 class DataParallel:
     """The kernels of one program and the arrays that they share, all on one in-order queue.
 
-    Kernels launched by `run` take `uint count, uint block` first; the program includes build/scan.cl. `peak_bytes` is
-    the peak memory of its arrays; data_bytes: their approximate total size. Launches are short, so waiting for them
-    need not handle signals. All methods may raise DeviceError.
+    Kernels launched by `run`, `run_each` and `run_tiles` take `uint count, uint block` first, where `block` is the number
+    of items per work-item, or per work-group; the program includes build/scan.cl. `peak_bytes` is the peak memory of its
+    arrays; data_bytes: their approximate total size. Launches are short, so waiting for them need not handle signals.
+    All methods may raise DeviceError.
     """
 
     def __init__(self, device: Device, source: str, data_bytes: int = 0) -> None:
@@ -108,14 +111,35 @@ class DataParallel:
         return -(-count // self.block(count))
 
     def run(self, name: str, count: int, *arguments: Any) -> None:
-        """Run kernel `name` over `count` items, in launches that are each short.
+        """Run kernel `name` over `count` items, a block per work-item, in launches that are each short.
 
         Python ints are passed as uint, floats as float. The only index that kernels may use is their global id.
         """
-        block, local = self.block(count), self.device.local_size
+        self._run(name, count, self.block(count), self.device.local_size, arguments)
+
+    def run_each(self, name: str, count: int, *arguments: Any) -> None:
+        """Do as `run` for items that are independent: on a GPU each has a work-item, so that neighboring work-items
+        access neighboring memory."""
+        block = self.block(count) if self._kind == "cpu" else 1
+        self._run(name, count, block, self.device.local_size, arguments)
+
+    def run_tiles(self, name: str, count: int, *arguments: Any) -> None:
+        """Do as `run` with a tile of items per work-group, whose index is global id / local size."""
+        local = self.device.local_size
+        self._run(name, count, self._tile(count), local, arguments, items=local)
+
+    def tiles(self, count: int) -> int:
+        """Return the number of tiles."""
+        return -(-count // self._tile(count))
+
+    def _tile(self, count: int) -> int:
+        return self.block(count) if self._kind == "cpu" else TILE
+
+    def _run(self, name: str, count: int, block: int, local: int, arguments: Sequence[Any], items: int = 1) -> None:
+        """Run a kernel over blocks, each of which has `items` work-items."""
         values = np.uint32(count), np.uint32(block), *map(_scalar, arguments)
-        groups = -(-self.number(count) // local)
-        most = max(1, LAUNCH_ITEMS[self._kind] * self.device.info.compute_units // (block * local))
+        groups = -(-(-(-count // block) * items) // local)
+        most = max(1, LAUNCH_ITEMS[self._kind] * self.device.info.compute_units * items // (block * local))
         for first in range(0, groups, most):
             self._launch(name, min(most, groups - first), local, values, first)
 
@@ -142,7 +166,7 @@ class DataParallel:
         sums = self.empty(np.uint32, arrays * parts)
         self._scan(values, count, arrays, parts, sums)
         self._scan(sums, parts, arrays, 1, self._totals)
-        self.run("add_before", arrays * count, values, count, parts, sums)
+        self.run_each("add_before", arrays * count, values, count, parts, sums)
         self.free(sums)
 
     def sums(self, arrays: int = 1) -> list[int]:

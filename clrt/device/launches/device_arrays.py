@@ -59,10 +59,17 @@ def empty_array(device: Device, dtype: DTypeLike, size: int) -> DeviceArray:
 
 @driver_errors()
 def on_device(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
-    """Return the buffer of a device array, or a new buffer with a copy of a numpy array."""
+    """Return the buffer of a device array, or a new buffer with a copy of a numpy array.
+
+    NVIDIA's driver copies an array four times slower when it creates the buffer than by a command.
+    """
     if isinstance(array, DeviceArray):
         return array.buffer
-    return cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
+    if device.info.type == "cpu" or not array.nbytes:
+        return cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
+    buffer = cl.Buffer(device.context, cl.mem_flags.READ_WRITE, array.nbytes)
+    cl.enqueue_copy(device.queue, buffer, np.ascontiguousarray(array))
+    return buffer
 
 
 @driver_errors()

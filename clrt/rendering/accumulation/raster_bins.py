@@ -110,9 +110,9 @@ class RasterBins:
         triangles, spheres = self._drawn
         arguments = *self._scene, launch, fill, *sorted_into
         if triangles:
-            self._blocks.run("sort_triangles", triangles, *arguments, self._before, self._instances)
+            self._blocks.run_each("sort_triangles", triangles, *arguments, self._before, self._instances)
         if spheres:
-            self._blocks.run("sort_spheres", spheres, *arguments)
+            self._blocks.run_each("sort_spheres", spheres, *arguments)
 
     def _check(self, needs: Mapping[str, int], *sizes: int) -> None:
         info = self._device.info

@@ -71,9 +71,10 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
         "CLAMP": bool(biased_by(scene.render)),
         "DIRECT_LIGHT": choices.direct_light,
         "LOOP_LIMIT": loop_limit,
-        "SORT_HITS": choices.paths == "queues" and len(materials.used) > 1,
     }
     has["HORIZON"] = has["SMOOTH_NORMALS"] or has["NORMAL_MAPS"]
+    # Shading hits by material, and misses apart, pays where microfacet materials are evaluated: docs/measurements/gpu.md.
+    has["SORT_HITS"] = choices.paths == "queues" and any(feature.startswith("SMITH_") for feature in features)
     return features | {name for name, present in has.items() if present}
 
 
