@@ -63,9 +63,9 @@ KINDS = ("primary", "bounce", "shadow", "occluded")
 
 
 def layout_items(request: Request) -> Iterator[Item]:
-    """Yield each layout with each kind of rays."""
-    rays = Rays(request)
-    for name in CONTESTANTS:
+    """Yield each layout with each kind of rays, the device's own layout first."""
+    rays, own = Rays(request), open_device(request.device).layout
+    for name in sorted(CONTESTANTS, key=lambda name: CONTESTANTS[name][0] != own):
         for kind in KINDS:
             yield Item(f"{name}, {kind}", partial(_layout_rate, rays, name, kind, request.quick))
 
