@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from .queries.instanced import InstancedRayQuery as InstancedRayQuery
     from .queries.mesh import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
+    from .rendering.sensors import irradiance as irradiance, radiance as radiance
     from .scene.animation import Animation as Animation, Keyframe as Keyframe
     from .scene.camera_path import frames as frames, turntable as turntable
     from .scene.lights import DirectionalLight as DirectionalLight, PointLight as PointLight, SpotLight as SpotLight
@@ -69,6 +70,7 @@ _HOME = {
     "output.scenes": ("save_scene",),
     "queries.mesh": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
+    "rendering.sensors": ("irradiance", "radiance"),
     "scene.animation": ("Animation", "Keyframe"),
     "scene.camera_path": ("frames", "turntable"),
     "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),

@@ -183,7 +183,9 @@ def _plan(work: DataParallel, shape: BuilderLayout, primitives: Primitives, tree
     plans, leaves = work.empty(np.uint32, tree.count), work.empty(np.float32, 2 * tree.count)
     costs = work.empty(np.float32, tree.count * (shape.children - 1))
     for first, count in zip(itertools.accumulate(tree.rounds, initial=0), tree.rounds):
-        work.run_each("plan_nodes", count, *primitives.arguments, tree.nodes, first, root, world[0], plans, costs, leaves)
+        work.run_each(
+            "plan_nodes", count, *primitives.arguments, tree.nodes, first, root, world[0], plans, costs, leaves
+        )
     work.free(costs, leaves)
     return _Plan(primitives, tree, plans, float(area[0]))
 

@@ -7,6 +7,10 @@
 //                                                 Returns the lanes that have one: the samples of the others are black,
 //                                                 and their rays, which nothing follows, are finite
 //
+// or, if it defines LISTED_RAYS,
+//
+//   listed_ray(scene, launch, x, y, &ray)         the camera ray of pixel (x, y), likewise
+//
 // Each file documents the meaning of launch->right, up and forward; clrt/scene/cameras.py computes them.
 #include "sampler/interface.cl"
 #include "core/vector.cl"
@@ -60,6 +64,10 @@ static inline real2 place_in_pixel(const Scene *scene, const Launch *launch, ure
 // Generate a camera ray through pixel (x, y), filter-sampled by u. Returns the lanes that have one.
 static inline ireal camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u, Sampler *sampler,
                                CameraRay *ray) {
+#if LISTED_RAYS
+    return listed_ray(scene, launch, x, y, ray);
+#else
     real2 place = place_in_pixel(scene, launch, x, y, u);
     return ray_through(launch, place.x, place.y, sampler, ray);
+#endif
 }

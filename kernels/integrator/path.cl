@@ -1,40 +1,9 @@
-// Path tracing integrator of the megakernel (integrator/megakernel.cl). direct: light from paths of at most two
-// segments; removed: by clamps.
+// Path tracing integrator of the megakernel (integrator/megakernel.cl).
 #include "integrator/camera_rays.cl"
-#include "integrator/path_segment.cl"
-#include "traverse/visits.cl"
+#include "integrator/path_segments.cl"
 
 static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
                                ureal *rays, real3 *direct, real *removed) {
-    real3 L = splat(ZERO);
     Path path = path_along(ray->origin, ray->direction);
-    for (int depth = 1;; ++depth) {
-        *rays += active ? (ureal)(1) : (ureal)(0);
-        VISIT(segments, depth);
-        Surface surface;
-        Hits hits = first_surface(scene, path.origin, path.wi, depth == 1, active, sampler, &surface);
-        ireal hit = active & (hits.primitive >= 0);
-        absorb(&path, hit ? hits.t : (real)(INFINITY));
-        L = add(L, clamped(launch, emitted_light(scene, &path, &surface, hits.t, hit), depth, removed));
-        L = add(L, clamped(launch, escaped_light(scene, &path, active & !hit), depth, removed));
-#if DIRECT_LIGHT
-        if (depth <= 2) *direct = L;
-#endif
-        active = hit;
-        if (depth >= launch->max_depth || !ANY(active)) return L;
-#if PRIMITIVES
-#if DISPERSION
-        surface.throughput = path.beta;
-#endif
-        VISIT(shading, surface.material);
-        Shading shading = shading_at(scene, path.wi, &surface);
-#if LIGHTS
-        ShadowRay shadow;
-        ireal sent = aim_at_light(scene, &path, &surface, &shading, active, sampler, &shadow);
-        *rays += sent ? (ureal)(1) : (ureal)(0);
-        if (ANY(sent)) L = add(L, clamped(launch, light_along(scene, &shadow, sent), depth + 1, removed));
-#endif
-        active = go_on(&path, &surface, &shading, active, depth, launch->max_depth, sampler);
-#endif
-    }
+    return light_of_path(scene, launch, &path, 1, active, sampler, rays, direct, removed);
 }

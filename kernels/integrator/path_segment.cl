@@ -99,8 +99,7 @@ static inline real3 escaped_light(const Scene *scene, const Path *path, ireal es
 #endif
 }
 
-#if PRIMITIVES
-#if LIGHTS
+#if LIGHTS && (PRIMITIVES || LISTED_RAYS)
 // A shadow ray to a sampled point on a light, and its contribution if it is unoccluded.
 typedef struct {
     real3 origin, target, wi;
@@ -111,6 +110,20 @@ typedef struct {
     real3 contribution;
 } ShadowRay;
 
+// Trace the shadow rays of the lanes `sent`; return their contributions.
+static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal sent) {
+#if OPACITY
+    ireal light = ray->light;
+#else
+    ireal light = (ireal)(-1);
+#endif
+    real visible = transmittance(scene, ray->origin, light, ray->target, ray->wi, ray->infinite, sent);
+    return choose(visible > 0.0f, scale(ray->contribution, visible), splat(ZERO));
+}
+#endif
+
+#if PRIMITIVES
+#if LIGHTS
 // 2. Next-event estimation: sample a light and the shadow ray to it. Returns the lanes that need a shadow ray.
 static inline ireal aim_at_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
                                  ireal active, Sampler *sampler, ShadowRay *ray) {
@@ -137,16 +150,6 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     return useful;
 }
 
-// Trace the shadow rays of the lanes `sent`; return their contributions.
-static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal sent) {
-#if OPACITY
-    ireal light = ray->light;
-#else
-    ireal light = (ireal)(-1);
-#endif
-    real visible = transmittance(scene, ray->origin, light, ray->target, ray->wi, ray->infinite, sent);
-    return choose(visible > 0.0f, scale(ray->contribution, visible), splat(ZERO));
-}
 #endif
 
 // 3. Sample the BSDF for the direction of the next segment. Returns the lanes whose paths continue: none if the next

@@ -1,4 +1,4 @@
-"""Data-parallel primitives: kernels over `count` items, with one of them or a block of consecutive ones per work-item."""
+"""Data-parallel primitives: kernels over `count` items, one or a block of consecutive ones per work-item."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ TILE = 2048
 class DataParallel:
     """The kernels of one program and the arrays that they share, all on one in-order queue.
 
-    Kernels launched by `run`, `run_each` and `run_tiles` take `uint count, uint block` first, where `block` is the number
-    of items per work-item, or per work-group; the program includes build/scan.cl. `peak_bytes` is the peak memory of its
-    arrays; data_bytes: their approximate total size. Launches are short, so waiting for them need not handle signals.
-    All methods may raise DeviceError.
+    Kernels launched by `run`, `run_each` and `run_tiles` take `uint count, uint block` first, where `block` is the
+    number of items per work-item, or per work-group; the program includes build/scan.cl. `peak_bytes` is the peak
+    memory of its arrays; data_bytes: their approximate total size. Launches are short, so waiting for them need not
+    handle signals. All methods may raise DeviceError.
     """
 
     def __init__(self, device: Device, source: str, data_bytes: int = 0) -> None:

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...device.programs.preamble import Buffers
 from ...scene.cameras import Camera, View
-from .records import LAUNCH
+from ...scene.ray_list import REPLICAS, RayList
+from .records import LAUNCH, LISTED_RAY
 
 #: Camera fields of the LAUNCH record.
 CAMERA_FIELDS = ("position", "right", "up", "forward", "lens_radius")
@@ -18,6 +20,23 @@ def camera_file(camera: Camera, integrator: str) -> str:
     """Return the kernel file that generates its rays. Integrator `depth` uses the ray through the lens center."""
     lens = camera.type.lens_kernel if camera.aperture_radius and integrator != "depth" else None
     return f"camera/{lens or camera.type.kernel}.cl"
+
+
+def camera_buffers(camera: Camera) -> Buffers:
+    """Return the buffers that its kernel file reads: those of a RayList, as many rays as fill the image."""
+    if not isinstance(camera, RayList):
+        return {}
+    width, height = camera.size
+    rays = np.zeros(width * height // REPLICAS, LISTED_RAY)
+    rays["direction"] = camera.directions[0]
+    rays["origin"][: len(camera.origins)] = camera.origins
+    rays["direction"][: len(camera.origins)] = camera.directions
+    return {"listed_rays": ("ListedRay", rays)}
+
+
+def camera_defines(camera: Camera) -> dict[str, int]:
+    """Return the macros that its kernel file reads."""
+    return {"REPLICAS": REPLICAS} if isinstance(camera, RayList) else {}
 
 
 def launch_record(camera: Camera, size: tuple[int, int]) -> NDArray[Any]:

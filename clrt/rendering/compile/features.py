@@ -9,9 +9,10 @@ from ...accel.traversal_kernels import tree_defines, tree_features, tree_files
 from ...device.programs.preamble import defines, scene_struct, type_list, typedefs
 from ...scene.materials.material_types import MATERIALS, Material
 from ...scene.materials.textures import Texture
-from ...scene.model import RenderSettings
+from ...scene.model import RenderSettings, Scene
+from ...scene.ray_list import RayList
 from ..film.tiles import TILE
-from .camera_kernel import camera_file
+from .camera_kernel import camera_defines, camera_file
 from .choices import OFFSETS, Choices, ResolvedChoices
 from .lights.light_types import SURFACES, TYPES
 from .pack_scene import PackedScene
@@ -73,7 +74,7 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
         "LOOP_LIMIT": loop_limit,
     }
     has["HORIZON"] = has["SMOOTH_NORMALS"] or has["NORMAL_MAPS"]
-    # Shading hits by material, and misses apart, pays where microfacet materials are evaluated: docs/measurements/gpu.md.
+    # Shading hits by material, and misses apart, pays where microfacet materials are evaluated (measurements/gpu.md).
     has["SORT_HITS"] = choices.paths == "queues" and any(feature.startswith("SMITH_") for feature in features)
     return features | {name for name, present in has.items() if present}
 
@@ -90,7 +91,7 @@ def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str
         [
             defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(packed.tree), **unit}),
             defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
-            defines({feature: 1 for feature in sorted(features)}),
+            defines({**{feature: 1 for feature in sorted(features)}, **camera_defines(packed.scene.camera)}),
             typedefs({"Counts": COUNTS, "Pixel": choices.pixel, "Guide": GUIDE, "Launch": LAUNCH}),
             scene_struct(packed.buffers, part_bytes),
             type_list("MATERIAL_TYPES", _numbered(materials.used)),
@@ -139,10 +140,16 @@ def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict
         "SAMPLER": [f"sampler/{scene.render.sampler}.cl"],
         "CAMERA": [camera_file(scene.camera, integrator)],
         "FILTER": ["film/box_filter.cl" if scene.render.filter == "box" else "film/table_filter.cl"],
-        "INTEGRATOR": [INTEGRATORS.get(integrator, "integrator/first_surface.cl")],
+        "INTEGRATOR": [_integrator_file(scene)],
         "HIT_ORDER": [f"integrator/queue_{'sorted' if 'SORT_HITS' in features else 'unsorted'}.cl"],
         "PICTURE": [f"integrator/first_surface_{integrator}.cl"],
     }
+
+
+def _integrator_file(scene: Scene) -> str:
+    if isinstance(scene.camera, RayList) and scene.camera.receivers:
+        return "integrator/irradiance.cl"
+    return INTEGRATORS.get(scene.render.integrator, "integrator/first_surface.cl")
 
 
 def _numbered(kinds: Iterable[type[Material]]) -> list[tuple[str, int]]:

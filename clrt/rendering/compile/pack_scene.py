@@ -19,6 +19,7 @@ from ...scene.geometry.scaling import SceneFrame, frame_of, in_frame
 from ...scene.materials.material_types import Material
 from ...scene.model import Scene
 from ...threads import beside
+from .camera_kernel import camera_buffers
 from .choices import Choices
 from .geometry.pack_geometry import TriangleCorners, normal_records, sphere_records, triangle_records
 from .geometry.pack_instances import ObjectIds, PackedInstances
@@ -148,6 +149,7 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: R
     buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, normals, tree is not NO_RAYS)
     buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.tangents)
     buffers |= materials.buffers | tables.buffers() | textures.buffers() | emitters.buffers | sky.buffers
+    buffers |= camera_buffers(shapes.scene.camera)
     if scene.render.filter != "box":
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
     return PackedScene(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, _counts(shapes, emitters))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..lights import Light
 from ..model import Camera, Instance, Mesh, Scene, Sphere, Vector
+from ..ray_list import RayList
 from .instancing import meshes_by_id
 
 #: Scenes whose largest coordinate (the camera's excluded) lies between 2^-20 and 2^20 are not scaled.
@@ -132,9 +133,10 @@ def _instances(instances: list[Instance], frame: SceneFrame) -> list[Instance]:
 
 def camera_in(camera: Camera, frame: SceneFrame) -> Camera:
     """Return a camera in a frame."""
-    return replace(
+    moved = replace(
         camera.scaled(frame.unit), position=frame.point(camera.position), look_at=frame.point(camera.look_at)
     )
+    return replace(moved, origins=frame.points(moved.origins)) if isinstance(moved, RayList) else moved
 
 
 def _sphere(sphere: Sphere, frame: SceneFrame) -> Sphere:
