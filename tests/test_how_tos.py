@@ -16,6 +16,7 @@ HOUSE = Path(__file__).parents[1]
 PAGES = {
     "rays": (4, ()),
     "transparent-background": (1, ("product.png",)),
+    "light-measurements": (2, ()),
     "dataset": (3, ("view_0003.exr", "view_0003.npz", "cameras.json")),
 }
 

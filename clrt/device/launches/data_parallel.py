@@ -26,8 +26,8 @@ ITEM_TURNS = 1024
 LAUNCH_ITEMS = {"cpu": 1 << 20, "gpu": 1 << 17}
 #: Work-items that scan cooperatively where that pays, as in build/scan.cl, and the number of elements per work-group.
 SCAN_ITEMS, SCAN_PART = 256, 8192
-#: Consecutive items per work-group of kernels whose work-items share them.
-TILE = 2048
+#: Consecutive items per work-group of kernels whose work-items share them, and its most work-items (build/tiles.cl).
+TILE, TILE_ITEMS = 2048, 64
 
 
 class DataParallel:
@@ -125,7 +125,7 @@ class DataParallel:
 
     def run_tiles(self, name: str, count: int, *arguments: Any) -> None:
         """Do as `run` with a tile of items per work-group, whose index is global id / local size."""
-        local = self.device.local_size
+        local = min(self.device.local_size, TILE_ITEMS)
         self._run(name, count, self._tile(count), local, arguments, items=local)
 
     def tiles(self, count: int) -> int:
