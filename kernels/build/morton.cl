@@ -18,7 +18,8 @@ static inline float3 twice_centre(Box box) { return box.lo + box.hi; }
 
 // Bounds of twice the centres in each tile: low in partial[0 … 2], high in partial[3 … 5].
 kernel void centre_bounds(uint count, uint block, SCENE_PARAMETERS, global float *partial) {
-    local float lows[3 * TILE_ITEMS], highs[3 * TILE_ITEMS];
+    local float lows[3 * TILE_ITEMS];
+    local float highs[3 * TILE_ITEMS];
     TILE_RANGE
     Box bounds = NO_BOX;
     for (uint i = first + me; i < end; i += items) {

@@ -25,7 +25,8 @@ kernel void count_digits(uint count, uint block, global const ulong *codes, uint
 
 kernel void move_digits(uint count, uint block, global const ulong *codes, global const uint *order, uint shift,
                         global const uint *places, global ulong *sorted_codes, global uint *sorted_order) {
-    local uint place[DIGITS], digits[TILE_ITEMS];
+    local uint place[DIGITS];
+    local uint digits[TILE_ITEMS];
     TILE_RANGE
     for (uint d = me; d < DIGITS; d += items) place[d] = places[d * tiles + tile];
     barrier(CLK_LOCAL_MEM_FENCE);
