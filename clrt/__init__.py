@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         SceneError as SceneError,
         UsageError as UsageError,
     )
+    from .output.datasets.save_views import save_views as save_views
     from .output.image import Image as Image
     from .output.image_error import compare as compare
     from .output.images import read_image as read_image
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from .queries.mesh import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
     from .rendering.sensors import irradiance as irradiance, radiance as radiance
+    from .rendering.views import each_view as each_view, render_views as render_views
     from .scene.animation import Animation as Animation, Keyframe as Keyframe
     from .scene.camera_path import frames as frames, turntable as turntable
     from .scene.lights import DirectionalLight as DirectionalLight, PointLight as PointLight, SpotLight as SpotLight
@@ -56,6 +58,7 @@ if TYPE_CHECKING:
         Scene as Scene,
         Sphere as Sphere,
     )
+    from .scene.view import View as View
 
     __version__: str
 
@@ -64,6 +67,7 @@ _HOME = {
     "device.discovery.discover": ("devices",),
     "errors": ("CheckpointError", "ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
     "queries.instanced": ("InstancedRayQuery",),
+    "output.datasets.save_views": ("save_views",),
     "output.image_error": ("compare",),
     "output.image": ("Image",),
     "output.images": ("read_image",),
@@ -71,6 +75,7 @@ _HOME = {
     "queries.mesh": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
     "rendering.sensors": ("irradiance", "radiance"),
+    "rendering.views": ("each_view", "render_views"),
     "scene.animation": ("Animation", "Keyframe"),
     "scene.camera_path": ("frames", "turntable"),
     "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
@@ -85,6 +90,7 @@ _HOME = {
         "Plastic",
     ),
     "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
+    "scene.view": ("View",),
     "scene.materials.textures": ("Picture", "Texture"),
 }
 _MODULES = ("trimesh",)

@@ -62,6 +62,9 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "Renderer checkpoint": lambda new_ck: list(
         clrt.Renderer(clrt.Scene(spheres=[clrt.Sphere()]), spp=1, size=(8, 8), checkpoint=new_ck).passes()
     ),
+    "save_views folder": lambda new: clrt.save_views(
+        new, clrt.Scene(), clrt.each_view(clrt.Scene(), [clrt.Camera()], "depth", size=(8, 8))
+    ),
     "save_scene path": lambda new_toml: save_scene(clrt.Scene(spheres=[clrt.Sphere()]), new_toml),
 }
 
@@ -87,4 +90,4 @@ def test_file_names_may_be_text_or_path_like(parameter: str, form: type, tmp_pat
     name = {"scene": "a.toml", "image": "a.exr"}.get(kind, kind.replace("_", "."))
     file = tmp_path / name
     call(form(file))
-    assert file.is_file()
+    assert file.exists()

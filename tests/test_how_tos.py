@@ -17,7 +17,7 @@ PAGES = {
     "rays": (4, ()),
     "transparent-background": (1, ("product.png",)),
     "light-measurements": (2, ()),
-    "dataset": (3, ("view_0003.exr", "view_0003.npz", "cameras.json")),
+    "dataset": (4, ("view_0003.exr", "spot/transforms.json", "spot/images/view_00003.png")),
 }
 
 

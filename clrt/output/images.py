@@ -126,6 +126,11 @@ def write_texels(path: Path, texels: NDArray[np.uint8]) -> None:
     _write(path, texels, {"oiio:UnassociatedAlpha": 1}, ("R", "G", "B", "A"))
 
 
+def write_channels(path: Path, samples: FloatArray, channels: Sequence[str]) -> None:
+    """Write (h, w, n) float32 samples of n named channels as an .exr, atomically. Raises OutputError."""
+    _write(path, samples, format_of(path).header({}), channels)
+
+
 def rgbe_rounded(pixels: FloatArray) -> FloatArray:
     """Round to the nearest colors in RGBE: 8 bits per channel at the scale of the brightest one (Ward 1991).
 

@@ -26,16 +26,16 @@ class Aovs:
     def __init__(self, names: str | Iterable[str] | None, integrator: str) -> None:
         self._names = chosen_aovs(names)
         check_light(self._names, integrator)
-        self._first_hits = dict[str, NDArray[np.generic]]()
+        self.first_hits = dict[str, NDArray[np.generic]]()
 
     def begin(self, picture: Accumulation, scene: Scene) -> None:
         """Render the first-hit AOVs, so that an interrupted render has them, too."""
         seen = seen_first(self._names)
-        self._first_hits = picture.first_hits(scene, seen) if seen else {}
+        self.first_hits = picture.first_hits(scene, seen) if seen else {}
 
     def of(self, film: Film) -> dict[str, NDArray[np.generic]]:
         """Return all requested AOVs, given this film."""
-        made = self._first_hits | film_aovs(film, self._names)
+        made = self.first_hits | film_aovs(film, self._names)
         return {name: made[name] for name in self._names}
 
 

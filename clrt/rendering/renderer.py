@@ -221,6 +221,11 @@ class Renderer:
         """Return the AOVs of a state by name, in the order in which they were requested."""
         return self._aovs.of(state.film)
 
+    @property
+    def first_hits(self) -> dict[str, NDArray[np.generic]]:
+        """The requested AOVs of first hits, which are known before `passes`."""
+        return self._aovs.first_hits
+
     def _save_unfinished(self) -> None:
         """Write a checkpoint if `passes` is left before its end, unless the render is abandoned or the device fails."""
         if self._progress.saves_unfinished:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ...aov_types import AOV_TYPES, aovs_from
 from ...device.programs.preamble import typedefs
 from ...device.programs.struct_types import record
-from ...scene.materials.material_types import Material
 from ...scene.model import Scene
+from ...scene.numbered_objects import materials_of
 from ..compile.compile_scene import CompiledScene
 from .accumulation import Accumulation
 from .per_pixel_kernel import render_pixels
@@ -94,9 +94,5 @@ def _places(
 def _ids(session: Accumulation, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:
     """Return the ids at first hits: the scene's object, its primitive, and its material."""
     which, primitive = session.compiled.objects.met(seen["primitive"], seen["instance"])
-    distinct: dict[Material, int] = {}
-    users = [mesh.material for mesh in scene.meshes]
-    users += [instance.material or instance.mesh.material for instance in scene.instances]
-    users += [sphere.material for sphere in scene.spheres]
-    materials = np.array([*(distinct.setdefault(material, len(distinct)) for material in users), -1])
+    materials = np.array([*materials_of(scene)[1], -1])
     return {"primitive": primitive, "object": which, "material": materials[which]}

@@ -1,0 +1,1 @@
+"""Datasets of views in the formats that other programs read."""

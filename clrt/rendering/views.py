@@ -1,0 +1,134 @@
+"""Images of one scene from many cameras, as arrays: light, AOVs and optical flow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Annotated, Any, Unpack, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..aov_types import aovs_from
+from ..device.open import Selectors
+from ..errors import SceneError, UsageError, did_you_mean
+from ..float_errors import with_default_errors
+from ..scene.model import Camera, Scene
+from ..scene.view import View
+from .aovs import AOVS
+from .listed_keywords import listed
+from .renderer import Renderer
+from .renderer_options import SETTINGS, PictureOptions, RendererOptions, TracingOptions
+
+#: AOVs under the names that datasets have for them.
+IDS = {"instance_id": "object", "material_id": "material"}
+LAYERS = ("rgb", *AOVS, *IDS, "flow")
+#: AOVs that `flow` is computed from.
+FLOW_FROM = ("position", "object")
+
+
+class ViewOptions(PictureOptions, TracingOptions, total=False):
+    """Keywords of views: those of a render but for its checkpoints."""
+
+    device: Annotated[Selectors, "See `clrt devices`, or an open device; several render one image together."]
+
+
+@listed(ViewOptions, SETTINGS)
+@with_default_errors
+def each_view(
+    scene: Scene,
+    cameras: Iterable[Camera],
+    layers: str | Iterable[str] = ("rgb",),
+    **options: Unpack[ViewOptions],
+) -> Iterator[View]:
+    """Render the scene from each camera in turn; BVHs and programs are kept, and memory does not grow.
+
+    layers: "rgb", linear Rec. 709, 3 channels; names of AOVs (docs/aovs.md), "instance_id" and "material_id" being
+    "object" and "material"; "flow", 2 channels: how many pixels to the right and down what the pixel's center shows
+    lies in the next view, NaN where nothing is hit, or where that view does not have it ahead, and in the last view.
+    Without "rgb" and AOVs of light, no light is computed. Raises UsageError for other layers, or for flow between
+    cameras without perspective, SceneError for a camera that cannot be used, and what `render` raises.
+    """
+    names = _chosen(layers)
+    aovs = {IDS.get(name, name): None for name in names if name not in ("rgb", "flow")}
+    aovs |= dict.fromkeys(FLOW_FROM) if "flow" in names else {}
+    given = cast(RendererOptions, {**options, "aovs": list(aovs)})
+    lit = "rgb" in names or not set(aovs).isdisjoint(aovs_from("film"))
+    if not lit:
+        given["integrator"] = "normals"  # its program is that of first hits alone
+    renderer = None
+    for number, (camera, following) in enumerate(_with_next(cameras)):
+        try:
+            if renderer is None:
+                renderer = Renderer(replace(scene, camera=camera), **given)
+            else:
+                renderer.look(camera)
+        except SceneError as error:
+            raise SceneError([f"view {number}: {problem}" for problem in error.problems]) from None
+        made: dict[str, NDArray[Any]] = dict(renderer.first_hits)
+        if lit:
+            for state in renderer.passes():
+                pass
+            made |= renderer.aovs(state) | {"rgb": state.pixels}
+        if "flow" in names:
+            made["flow"] = _flow(made["position"], np.greater_equal(made["object"], 0), following)
+        shown = {name: made[IDS.get(name, name)] for name in names}
+        yield View(camera, {name: layer.reshape(*layer.shape[:2], -1) for name, layer in shown.items()})
+
+
+@listed(ViewOptions, SETTINGS)
+def render_views(
+    scene: Scene,
+    cameras: Iterable[Camera],
+    layers: str | Iterable[str] = ("rgb",),
+    **options: Unpack[ViewOptions],
+) -> dict[str, NDArray[Any]]:
+    """Render the scene from each camera; return each layer as one array (views, height, width, channels).
+
+    The arguments and exceptions are those of `each_view`, which does not keep all views in memory.
+    """
+    poses = list(cameras)
+    arrays: dict[str, NDArray[Any]] = {}
+    for number, view in enumerate(each_view(scene, poses, layers, **options)):
+        for name, layer in view.layers.items():
+            array = arrays.setdefault(name, np.empty((len(poses), *layer.shape), layer.dtype))
+            array[number] = layer
+    return arrays
+
+
+def _chosen(layers: str | Iterable[str]) -> tuple[str, ...]:
+    """Return the names without duplicates. Raises UsageError for names not in LAYERS."""
+    names = tuple(dict.fromkeys(layers.split(",") if isinstance(layers, str) else layers))
+    for name in names:
+        if name not in LAYERS:
+            raise UsageError(f"layer {name!r} is unknown; choose from {', '.join(LAYERS)}{did_you_mean(name, LAYERS)}")
+    if not names:
+        raise UsageError(f"there are no layers; choose from {', '.join(LAYERS)}")
+    return names
+
+
+def _with_next(cameras: Iterable[Camera]) -> Iterator[tuple[Camera, Camera | None]]:
+    """Yield each camera with the one after it."""
+    before = None
+    for camera in cameras:
+        if before is not None:
+            yield before, camera
+        before = camera
+    if before is not None:
+        yield before, None
+
+
+def _flow(position: NDArray[Any], hit: NDArray[np.bool_], following: Camera | None) -> NDArray[np.float32]:
+    """Return (height, width, 2): the way from each pixel's center to where the next camera sees the same point."""
+    height, width = hit.shape
+    if following is None:
+        return np.full((height, width, 2), np.nan, np.float32)
+    if following.projection != "perspective":
+        raise UsageError(f"flow is between perspective cameras, and one is {following.projection}; leave it out")
+    pose = following.world_to_camera
+    points = position.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
+    ahead = np.where(hit & (points[..., 2] > 0), points[..., 2], np.nan)
+    places = points @ following.matrix((width, height)).T
+    centers = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
+    flow: NDArray[np.float32] = (places[..., :2] / ahead[..., None] - centers).astype(np.float32)
+    return flow
