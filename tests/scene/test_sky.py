@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta, timezone
 from typing import Any
 from zoneinfo import ZoneInfo
@@ -12,9 +13,11 @@ from numpy.typing import NDArray
 
 import clrt
 from clrt.errors import SceneError
-from clrt.scene.lights import DirectionalLight
+from clrt.scene.animation import Animation, Keyframe
+from clrt.scene.lights import DirectionalLight, PointLight
+from clrt.scene.model import Scene
 from clrt.scene.sky.hosek_wilkie import SUN_DEGREES, SUN_WAVELENGTHS, WIDTH, SkyRadiance, sun_irradiance
-from clrt.scene.sky.sky import Sky
+from clrt.scene.sky.sky import Sky, SkyEnvironment
 from clrt.scene.sky.sky_image import horizontal_irradiance, sky_image
 from clrt.scene.spectra import rgb_of_spectrum
 
@@ -204,6 +207,13 @@ def test_the_compass() -> None:
     assert np.arctan2(brightest[0], brightest[2]) == pytest.approx(np.arctan2(x, z), abs=0.02)  # at the horizon
 
 
+def test_directions_have_any_length() -> None:
+    for length in (1e-300, 1e-20, 1.0, 5e37):
+        sky = Sky(sun_direction=(0, 3 * length, -4 * length))
+        np.testing.assert_allclose(sky.towards_sun, [0, 0.6, -0.8], rtol=1e-12)
+        np.testing.assert_allclose(sky.position, [np.degrees(np.arcsin(0.6)), 0.0], rtol=1e-12)
+
+
 def test_time_zones_are_offsets() -> None:
     place: dict[str, Any] = {"latitude": 52.5, "longitude": 13.4}
     named = Sky(time=datetime(2026, 6, 21, 12, tzinfo=ZoneInfo("Europe/Berlin")), **place)
@@ -217,8 +227,9 @@ def test_time_zones_are_offsets() -> None:
     [
         ({}, "sky: has no sun; write time, latitude and longitude, or sun_direction"),
         ({"latitude": 3}, "sky: time and longitude are missing; add what is"),
-        ({"sun_direction": (0, 1, 0), "latitude": 3}, "sky: has both a sun_direction and latitude; keep one of them"),
+        ({"sun_direction": (0, 1, 0), "latitude": 0}, "sky: has both a sun_direction and latitude; keep one of them"),
         ({"sun_direction": (0, 1, 0), "rotation_degrees": 3}, "both a sun_direction and rotation_degrees; keep one"),
+        ({"sun_direction": (0, 1, 0), "hours_per_second": 3}, "both a sun_direction and hours_per_second; keep one"),
         ({"sun_direction": (0, 0, 0)}, "sky.sun_direction: [0, 0, 0] is not a direction; write the one towards"),
         (
             {"sun_direction": (3, -4, 0)},
@@ -242,3 +253,38 @@ def test_mistakes(values: dict[str, Any], sentence: str) -> None:
         clrt.Sky(**values)
     (problem,) = caught.value.problems
     assert sentence in problem and problem.startswith("sky")
+
+
+def test_the_sun_moves_in_frames() -> None:
+    """Frames are as under skies at their times; the camera, other lights and the map's own rotation stay."""
+    start = datetime(2026, 6, 21, 6, tzinfo=UTC)
+    sky = Sky(time=start, latitude=50, longitude=5, hours_per_second=2.0)
+    lamp = PointLight(position=(0, 1, 2), intensity=(1, 1, 1))
+    scene = Scene(
+        environment=replace(sky.environment(), rotation_degrees=20.0),
+        lights=[*sky.lights(), lamp],
+        animation=Animation(fps=4.0, keyframes=(Keyframe(time=3.0), Keyframe(time=5.0))),
+    )
+    found = dict(clrt.frames(scene, [0, 3, 8]))
+    for number, still in found.items():
+        now = replace(sky, time=start + timedelta(hours=number / 2))
+        assert still.lights == [*now.lights(), lamp] and still.camera == scene.camera
+        assert isinstance(still.environment, SkyEnvironment) and still.environment.rotation_degrees == 20
+        np.testing.assert_array_equal(still.environment.image, now.environment().image)
+    without = dict(clrt.frames(replace(scene, lights=[lamp]), [8]))[8]
+    assert without.lights == [lamp] and without.environment.image is not None
+    turning = dict(clrt.frames(clrt.turntable(scene, 12, fps=4.0), [8]))[8]
+    assert turning.lights == found[8].lights and turning.camera != scene.camera
+
+
+def test_frames_at_night_are_refused_before_the_first() -> None:
+    sky = Sky(time=datetime(2026, 6, 21, 12, tzinfo=UTC), latitude=50, longitude=5, hours_per_second=2.0)
+    scene = clrt.turntable(Scene(environment=sky.environment(), lights=sky.lights()), 24, fps=4.0)
+    with pytest.raises(
+        SceneError, match="sky.time: at 2026-06-21T20:00:00.00:00 the sun is .* degrees below the horizon"
+    ):
+        clrt.frames(scene)
+    assert next(clrt.frames(scene, range(15)))[0] == 0
+    fast = replace(sky, hours_per_second=1e30)
+    with pytest.raises(SceneError, match="lead to no date after 0.25 s; write a smaller number"):
+        clrt.frames(replace(scene, environment=fast.environment()))

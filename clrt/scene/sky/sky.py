@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from datetime import datetime, timedelta, timezone
 from math import asin, atan2, cos, degrees, pi, radians, sin
 from typing import Annotated
@@ -13,9 +13,10 @@ import numpy as np
 from ...errors import SceneError
 from ..fields.limits import Ge, Le
 from ..fields.tuples import tuples_for_lists
-from ..lights import DirectionalLight, Light, unit_vector
+from ..geometry.transform import unit
+from ..lights import DirectionalLight, Light
 from ..materials.textures import NonNegative
-from ..model import Environment, Vector
+from ..model import Environment, Scene, Vector
 from ..validation.field_types import field_problems, show
 from .hosek_wilkie import SUN_DEGREES, sun_irradiance
 from .sky_image import horizontal_irradiance, sky_image
@@ -23,6 +24,8 @@ from .sun_position import SunPosition, sun_position
 
 Fraction = Annotated[float, Ge(0), Le(1)]
 PLACE = ("time", "latitude", "longitude")
+#: What a given direction of the sun replaces.
+OF_PLACE = (*PLACE, "rotation_degrees", "hours_per_second")
 UP = np.array([0.0, 1.0, 0.0])
 
 
@@ -44,6 +47,7 @@ class Sky:
     - ground: whether the lower half is the ground of this albedo, as sky and sun light it, or black.
     - sky_strength, sun_strength: factors; 0 leaves one out.
     - sun_angle_degrees: the angular diameter of the sun's disc, which does not change its irradiance.
+    - hours_per_second: in the frames of an animation, how fast `time` passes from frame 0 on.
     """
 
     sun_direction: Vector | None = None
@@ -57,6 +61,7 @@ class Sky:
     sky_strength: NonNegative = 1.0
     sun_strength: NonNegative = 1.0
     sun_angle_degrees: Annotated[float, Ge(0), Le(90)] = SUN_DEGREES
+    hours_per_second: float = 0.0
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
@@ -80,17 +85,27 @@ class Sky:
         if self.sun_direction is None:
             assert self.time is not None and self.latitude is not None and self.longitude is not None
             return sun_position(self.time, self.latitude, self.longitude)
-        x, y, z = unit_vector(self.sun_direction)
+        x, y, z = self.towards_sun
         return SunPosition(degrees(asin(min(max(y, -1.0), 1.0))), degrees(atan2(x, -z)) % 360)
 
     @property
     def towards_sun(self) -> Vector:
         """Return the unit vector to the sun."""
         if self.sun_direction is not None:
-            return unit_vector(self.sun_direction)
+            x, y, z = unit(np.array(self.sun_direction)).tolist()
+            return x, y, z
         elevation, azimuth = map(radians, self.position)
         azimuth -= radians(self.rotation_degrees)
         return cos(elevation) * sin(azimuth), sin(elevation), -cos(elevation) * cos(azimuth)
+
+    def after(self, seconds: float) -> Sky:
+        """Return the sky at another time of an animation. Raises SceneError if the sun has set or not risen."""
+        try:
+            passed = timedelta(hours=self.hours_per_second * seconds)
+            return self if self.time is None else replace(self, time=self.time + passed)
+        except OverflowError:
+            fast = f"{self.hours_per_second:g} hours per second lead to no date after {seconds:g} s"
+            raise SceneError(f"sky.hours_per_second: {fast}; write a smaller number") from None
 
     def environment(self) -> SkyEnvironment:
         """Return the sky without the sun's disc, as an environment map."""
@@ -105,7 +120,7 @@ class Sky:
         """Return the sun; an empty list if it does not shine."""
         x, y, z = self.towards_sun
         sun: Light = DirectionalLight(
-            direction=(-x, -y, -z), irradiance=self.irradiance, angle_degrees=self.sun_angle_degrees
+            direction=(0 - x, 0 - y, 0 - z), irradiance=self.irradiance, angle_degrees=self.sun_angle_degrees
         )
         return [] if sun.is_black else [sun]
 
@@ -123,7 +138,7 @@ class Sky:
                 yield "sky: has no sun; write time, latitude and longitude, or sun_direction"
             elif missing:
                 yield f"sky: {' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing; add what is"
-        elif also := given + ["rotation_degrees"] * bool(self.rotation_degrees):
+        elif also := [name for name in OF_PLACE if getattr(self, name) != getattr(Sky, name)]:
             yield f"sky: has both a sun_direction and {also[0]}; keep one of them"
         elif not any(self.sun_direction):
             yield "sky.sun_direction: [0, 0, 0] is not a direction; write the one towards the sun"
@@ -136,3 +151,17 @@ class SkyEnvironment(Environment):
     """Environment map of an analytic sky, which scene files are written with instead of its image."""
 
     sky: Sky
+
+
+def moving_sky(scene: Scene) -> Sky | None:
+    """Return the scene's sky if its time passes in the frames of an animation."""
+    found = scene.environment
+    return found.sky if isinstance(found, SkyEnvironment) and found.sky.hours_per_second else None
+
+
+def with_sky(scene: Scene, old: Sky, new: Sky) -> Scene:
+    """Return the scene with its environment, and its sun if that is the first light, as of the new sky."""
+    suns, made = old.lights(), new.environment()
+    assert isinstance(scene.environment, SkyEnvironment)
+    lights = [*new.lights(), *scene.lights[len(suns) :]] if scene.lights[: len(suns)] == suns else scene.lights
+    return replace(scene, environment=replace(scene.environment, image=made.image, sky=new), lights=lights)
