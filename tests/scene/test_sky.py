@@ -28,6 +28,27 @@ RNG = np.random.default_rng(2012)
 UP = np.array([0.0, 1.0, 0.0])
 #: Mitsuba's integral of the color matching function, by which it divides.
 THEIR_WIDTH = 106.7502594
+#: Radiance of Mitsuba 3.9.1's `sunsky` in the variant scalar_rgb: elevation of the sun, turbidity, albedo, cosine from
+#: the zenith, azimuth from the sun.
+SKIES = [
+    (56.0, 1.0, (0.9, 0.78, 0.23), 0.314, 157, (0.0843120, 0.1409136, 0.1693556)),
+    (1.5, 1.6, (0.82, 0.8, 0.47), 0.317, 50, (0.0307221, 0.0321531, 0.0253493)),
+    (23.4, 2.3, (0.45, 0.5, 0.55), 0.996, 143, (0.0130928, 0.0278923, 0.0567650)),
+    (55.8, 3.0, (0.99, 0.22, 0.16), 0.62, 8, (0.1237808, 0.1430357, 0.1965357)),
+    (4.1, 4.4, (0.51, 0.47, 0.92), 0.637, 93, (0.0174814, 0.0242351, 0.0294186)),
+    (44.7, 6.5, (0.25, 0.01, 0.19), 0.698, 36, (0.1835059, 0.1894307, 0.2231703)),
+    (33.5, 8.8, (0.0, 0.83, 0.15), 0.282, 158, (0.0589003, 0.1323537, 0.1179544)),
+    (45.9, 10.0, (0.85, 0.64, 0.74), 0.11, 97, (0.2388218, 0.1990658, 0.2096310)),
+]
+#: Irradiance by the sun in scalar_spectral with `complex_sun`, integrated over the disc: elevation, turbidity.
+SUNS = [
+    (0.5, 2.0, (0.14513, 0.02511, 0.0)),
+    (4.0, 1.0, (0.70212, 0.28573, 0.02668)),
+    (12.5, 3.0, (1.04532, 0.67053, 0.29124)),
+    (30.0, 5.3, (1.17519, 0.89436, 0.59676)),
+    (55.5, 2.7, (1.42787, 1.16487, 0.88112)),
+    (88.0, 10.0, (0.97580, 0.77734, 0.62240)),
+]
 
 
 def sunny(elevation: float, azimuth: float = 0.0) -> tuple[float, float, float]:
@@ -55,6 +76,16 @@ def radiance(mi: Any, emitter: Any, towards: Doubles) -> Doubles:
             values += list(emitter.eval(si))
         found.append(values[:11])
     return np.array(found)
+
+
+def test_values_of_mitsuba() -> None:
+    for elevation, turbidity, albedo, cosine, azimuth, wanted in SKIES:
+        up, across = np.radians([elevation, azimuth])
+        angle = np.arccos(cosine * np.sin(up) + np.sqrt(1 - cosine**2) * np.cos(up) * np.cos(across))
+        found = SkyRadiance(elevation, turbidity, albedo).at(np.array(cosine), np.array(angle))
+        np.testing.assert_allclose(found, np.array(wanted) * THEIR_WIDTH / WIDTH, rtol=2e-5)
+    for elevation, turbidity, wanted in SUNS:
+        np.testing.assert_allclose(sun_irradiance(elevation, turbidity), wanted, rtol=2e-3, atol=2e-5)
 
 
 @pytest.mark.needs("mitsuba")
