@@ -346,11 +346,11 @@ class _Writer:
 def _sky_of(scene: Scene) -> Sky | None:
     """Return the analytic sky that the environment and the first light are, unless these were changed."""
     found = scene.environment
-    if not isinstance(found, SkyEnvironment) or (found.strength, found.rotation_degrees) != (1.0, 0.0):
+    if not isinstance(found, SkyEnvironment):
         return None
-    suns = found.sky.lights()
-    same = scene.lights[: len(suns)] == suns and np.array_equal(found.image, found.sky.environment().image)  # type: ignore[arg-type]
-    return found.sky if same else None
+    made, suns = found.sky.environment(), found.sky.lights()
+    same = all(np.array_equal(getattr(found, each.name), getattr(made, each.name)) for each in fields(Environment))
+    return found.sky if same and scene.lights[: len(suns)] == suns else None
 
 
 def _moves(table: Mapping[str, Any]) -> bool:
