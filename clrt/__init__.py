@@ -58,6 +58,7 @@ if TYPE_CHECKING:
         Scene as Scene,
         Sphere as Sphere,
     )
+    from .scene.sky.sky import Sky as Sky
     from .scene.view import View as View
 
     __version__: str
@@ -92,6 +93,7 @@ _HOME = {
     "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
     "scene.view": ("View",),
     "scene.materials.textures": ("Picture", "Texture"),
+    "scene.sky.sky": ("Sky",),
 }
 _MODULES = ("trimesh",)
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

@@ -17,6 +17,7 @@ PAGES = {
     "rays": (4, ()),
     "transparent-background": (1, ("product.png",)),
     "light-measurements": (2, ()),
+    "sky": (2, ("noon.png", "outside.toml", "hour_09.png", "hour_21.png")),
     "dataset": (4, ("view_0003.exr", "spot/transforms.json", "spot/images/view_00003.png")),
 }
 

@@ -27,7 +27,7 @@ def test_wheel_holds_every_module_kernel_and_scene(tmp_path: Path) -> None:
     packed = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     modules = {
         str(file.relative_to(ROOT))
-        for pattern in ("*.py", "*.c", "*.csv", "*.json", "*.toml", "py.typed")
+        for pattern in ("*.py", "*.c", "*.csv", "*.json", "*.npz", "*.toml", "*.txt", "py.typed")
         for file in (ROOT / "clrt").rglob(pattern)
     }
     kernels = {

@@ -23,6 +23,7 @@ from clrt.scene.materials.material import SHARED
 from clrt.scene.materials.material_types import MATERIALS, Material, MetallicRoughness
 from clrt.scene.materials.presets import CONDUCTORS, F0_PRESETS
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
+from clrt.scene.sky.sky import Sky
 
 from .covering import others
 from .rendering.ggx import albedo
@@ -149,6 +150,7 @@ TABLES: dict[str, type] = {
     "[[keyframe]]": Keyframe,
     "[render]": RenderSettings,
     "[environment]": Environment,
+    "[sky]": Sky,
     "[materials.NAME]": Material,
     "[[mesh]]": MeshTable,
     "[[instance]]": InstanceTable,

@@ -11,6 +11,7 @@ from ..scene.editing import materials_of
 from ..scene.materials.textures import Texture
 from ..scene.model import Environment, Instance, Mesh, Scene, Sphere
 from ..scene.provenance import material_of
+from ..scene.sky.sky import SkyEnvironment
 
 #: Most lines per list; --json has all.
 MOST = 40
@@ -53,7 +54,16 @@ def lights_in(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _environment(sky: Environment) -> Iterator[dict[str, Any]]:
-    if sky.image is not None and sky.strength:
+    if isinstance(sky, SkyEnvironment):
+        elevation, azimuth = (round(angle, 2) for angle in sky.sky.position)
+        yield {
+            "type": "sky",
+            "sun_elevation_degrees": elevation,
+            "sun_azimuth_degrees": azimuth,
+            "turbidity": sky.sky.turbidity,
+            "strength": sky.strength * sky.sky.sky_strength,
+        }
+    elif sky.image is not None and sky.strength:
         height, width = sky.image.shape[:2]
         yield {"type": "environment map", "size": f"{width}x{height}", "strength": sky.strength}
     elif sky.image is None and any(sky.color) and sky.strength:

@@ -33,6 +33,7 @@ NAMES = {
     ("numpy", "dtype"),
     ("collections", "OrderedDict"),
     ("builtins", "complex"),
+    *(("datetime", name) for name in ("datetime", "timezone", "timedelta")),
     *(
         (f"numpy.{core}", name)
         for core in ("core.multiarray", "_core.multiarray")

@@ -12,6 +12,7 @@ from ..errors import SceneError, UsageError
 from .animation import Animation, Keyframe, ModelAnimation, SceneAnimation
 from .model import Camera, Scene
 from .model_pose import posed
+from .sky.sky import moving_sky, with_sky
 from .splines import Doubles, smooth
 from .validation.field_types import field_problems
 
@@ -37,8 +38,8 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
 def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
     """Return the number and the static scene of all frames, or of the `chosen` ones.
 
-    If no model moves, the scenes differ in their camera alone. Raises SceneError if the scene has no animation or an
-    invalid one, UsageError for an invalid number.
+    If neither a model nor the sun moves, the scenes differ in their camera alone. Raises SceneError if the scene has no
+    animation or an invalid one, or if the sun is below the horizon in a frame; UsageError for an invalid number.
     """
     animation = scene.animation
     if animation is None:
@@ -56,9 +57,14 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
     if isinstance(animation, ModelAnimation):
         animation = SceneAnimation(models=(animation,), fps=animation.fps)
     if isinstance(animation, SceneAnimation):
-        return _moving_frames(scene, animation, numbers)
-    cameras = _cameras(scene.camera, animation, np.array(numbers, np.float64))
-    return ((number, replace(scene, camera=camera, animation=None)) for number, camera in zip(numbers, cameras))
+        moving = _moving_frames(scene, animation, numbers)
+    else:
+        cameras = _cameras(scene.camera, animation, np.array(numbers, np.float64))
+        moving = ((number, replace(scene, camera=camera, animation=None)) for number, camera in zip(numbers, cameras))
+    if (sky := moving_sky(scene)) is None:
+        return moving
+    skies = [sky.after(number / animation.fps) for number in numbers]  # all are valid before the first is rendered
+    return ((number, with_sky(still, sky, now)) for (number, still), now in zip(moving, skies))
 
 
 def _moving_frames(scene: Scene, animation: SceneAnimation, numbers: Sequence[int]) -> Iterator[tuple[int, Scene]]:

@@ -54,6 +54,16 @@ material = "shell"
     assert found["light_list"][2] == {"type": "sphere", "name": "bulb", "radiance": [3, 2, 1]}
 
 
+def test_info_lists_a_sky_by_where_its_sun_is(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(
+        "[sky]\nsun_direction = [1, 1, 0]\nturbidity = 2.5\nsky_strength = 2\n[[sphere]]\n"
+    )
+    lines = clrt("info", "a.toml", cwd=tmp_path).stdout.splitlines()
+    sun, sky = (line.split(maxsplit=1)[1] for line in lines if line.startswith("light "))
+    assert sun.startswith("directional: direction -0.7071 -0.7071 0, irradiance ") and "angle_degrees 0.5358" in sun
+    assert sky == "sky: sun_elevation_degrees 45, sun_azimuth_degrees 90, turbidity 2.5, strength 2"
+
+
 def test_info_lists_the_extensions_of_a_model_and_what_is_left_out(tmp_path: Path) -> None:
     """Supported extensions by name; others with the reason. A required one can be ignored by name."""
     gltf = ball()

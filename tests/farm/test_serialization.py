@@ -6,8 +6,10 @@ import os
 import pickle
 import sys
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from typing import Any
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pytest
@@ -30,6 +32,13 @@ def test_what_arrives_is_what_was_sent(name: str) -> None:
     arrived = unpack(text, arrays)
     assert scene_hash(arrived) == scene_hash(scene) and arrived.render == scene.render
     assert len(text) < 64 * LARGE and all(array.nbytes >= LARGE for array in arrays.values())
+
+
+def test_a_sky_at_a_time_arrives() -> None:
+    time = datetime(2026, 6, 21, 12, tzinfo=ZoneInfo("Europe/Berlin"))
+    scene = Scene(environment=clrt.Sky(time=time, latitude=52.5, longitude=13.4).environment())
+    parcel = pack(scene)
+    assert scene_hash(unpack(parcel.text, parcel.arrays)) == scene_hash(scene)
 
 
 def test_an_array_travels_once() -> None:

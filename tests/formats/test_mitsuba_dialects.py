@@ -17,7 +17,7 @@ from clrt.formats.load_scene import load
 from clrt.formats.mitsuba.environment_map import rows_at_middles, turned_map
 from clrt.formats.mitsuba.values import blackbody
 from clrt.output.images import write_image
-from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
+from clrt.scene.lights import PointLight, SpotLight
 from clrt.scene.materials.material_types import Conductor, Diffuse, MetallicRoughness, Mirror, Phong
 from clrt.scene.materials.textures import Texture
 from clrt.scene.model import Scene
@@ -303,39 +303,6 @@ def test_principled_keeps_its_parameters(folder: Path) -> None:
     found = load(folder / "a.xml", approximate=True).spheres[0].material
     assert isinstance(found, MetallicRoughness) and found.ior == pytest.approx(1.5)
     assert (found.color, found.metallic, found.roughness, found.clearcoat) == ((0.1, 0.2, 0.3), 0.25, 0.4, 0.5)
-
-
-@pytest.mark.parametrize(("version", "zenith"), [("0.6.0", (0, 1, 0)), ("3.0.0", (0, 0, 1))])
-def test_daylight(folder: Path, version: str, zenith: tuple[int, int, int]) -> None:
-    """The sun is where sun_direction, or the time and place, says; Mitsuba 0.x's zenith is +y, Mitsuba 3's +z."""
-    text = "<scene version='{}'><emitter type='{}'>{}</emitter></scene>"
-    direction = '<vector name="sun_direction" x="0.3" y="0.5" z="0.6"/>'
-    (folder / "a.xml").write_text(text.format(version, "sunsky", direction))
-    with pytest.raises(SceneError, match="daylight of Preetham"):
-        load(folder / "a.xml")
-    read = load(folder / "a.xml", approximate=True)
-    (sun,) = read.lights
-    assert isinstance(sun, DirectionalLight) and sun.angle_degrees == pytest.approx(0.5358)
-    np.testing.assert_allclose(np.multiply(sun.direction, -np.sqrt(0.7)), [0.3, 0.5, 0.6])
-    image = read.environment.image
-    assert image is not None and np.all(np.isfinite(image)) and image.min() == 0
-    height, width = image.shape[:2]
-    world = directions(np.pi * (np.arange(height) + 0.5) / height, 2 * np.pi * (np.arange(width) + 0.5) / width)
-    np.testing.assert_array_equal(image.max(axis=2) > 0, world @ zenith > 0)
-    brightest = world.reshape(-1, 3)[image.sum(axis=2).argmax()]
-    assert brightest @ np.negative(sun.direction) > np.cos(np.radians(3))
-    # At noon on the day of the equinox the sun is at 90° − latitude in the south (solar time; 12:07 by the clock).
-    noon = {"latitude": 40, "longitude": 0, "timezone": 0, "month": 3, "day": 21, "hour": 12, "minute": 7}
-    given = "".join(
-        f'<float name="{name}" value="{value}"/>' for name, value in noon.items() if name not in ("month", "day")
-    )
-    given += '<integer name="month" value="3"/><integer name="day" value="21"/>'
-    (folder / "a.xml").write_text(text.format(version, "sun", given))
-    (sun,) = load(folder / "a.xml", approximate=True).lights
-    assert isinstance(sun, DirectionalLight)
-    south = np.array([0, 0, 1] if version < "2" else [0, -1, 0])
-    expected = np.sin(np.radians(50)) * np.array(zenith) + np.cos(np.radians(50)) * south
-    assert -np.dot(sun.direction, expected) > np.cos(np.radians(2))
 
 
 def bomb(levels: int, start: str, use: str) -> str:

@@ -4,6 +4,7 @@ import math
 import os
 import subprocess
 import sys
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -16,6 +17,7 @@ from clrt.rendering.checkpoint.identity import scene_hash
 from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, RenderSettings, Sphere
+from clrt.scene.sky.sky import Sky, SkyEnvironment
 
 from ..scene.shapes import icosphere
 from .glb import Gltf
@@ -230,6 +232,19 @@ def test_scenes_load_without_opencl(folder: Path) -> None:
 def test_materials_of_every_type_load(folder: Path) -> None:
     scene = load(write(folder, GOOD + '[[sphere]]\nmaterial = "glass"\n'))
     assert scene.spheres[1].material == Mirror()
+
+
+def test_a_sky_is_an_environment_map_and_the_first_light(folder: Path) -> None:
+    (folder / "a.toml").write_text(
+        "[sky]\ntime = 2026-06-21T17:00:00+02:00\nlatitude = 52.5\nlongitude = 13.4\nalbedo = [0.1, 0.2, 0.3]\n"
+        '[[light]]\ntype = "point"\nposition = [1.5, 4, 3]\nintensity = [60, 58, 50]\n'
+    )
+    scene = load(folder / "a.toml")
+    zone = timezone(timedelta(hours=2))
+    sky = Sky(time=datetime(2026, 6, 21, 17, tzinfo=zone), latitude=52.5, longitude=13.4, albedo=(0.1, 0.2, 0.3))
+    assert scene.lights[:1] == sky.lights() and isinstance(scene.lights[1], PointLight) and len(scene.lights) == 2
+    assert isinstance(scene.environment, SkyEnvironment) and scene.environment.sky == sky
+    np.testing.assert_array_equal(scene.environment.image, sky.environment().image)
 
 
 def test_whole_numbers_may_be_of_any_length(folder: Path) -> None:

@@ -221,6 +221,23 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
             "light[0].inner_degrees: 45 is not below outer_degrees, 45; write a smaller",
         ),
         ("[environment]\nimage = 3", "environment.image: 3 is not a string; write a file name in quotes"),
+        ("[sky]", "sky: has no sun; write time, latitude and longitude, or sun_direction"),
+        ("sky = 3", "sky: 3 is not a table; write [sky]"),
+        ("[sky]\nsun_direction = [0, 1, 0]\nturbidty = 3", 'sky: key "turbidty" is unknown; did you mean "turbidity"?'),
+        (
+            "[sky]\nsun_direction = [0, 1, 0]\n[environment]",
+            "sky: the scene has both [sky] and [environment]; keep one",
+        ),
+        ('[sky]\ntime = "12:00"\nlatitude = 1\nlongitude = 2', 'sky.time: "12:00" is not a date and time; write one'),
+        ("[sky]\ntime = 2026-06-21\nlatitude = 1\nlongitude = 2", "sky.time: 2026-06-21 is not a date and time; write"),
+        (
+            "[sky]\ntime = 2026-06-21T12:00:00\nlatitude = 1\nlongitude = 2",
+            "sky.time: 2026-06-21T12:00:00 has no offset from UTC; write one, such as 2026-06-21T12:00:00+02:00",
+        ),
+        (
+            "[sky]\ntime = 2026-12-21T16:00:00Z\nlatitude = 60\nlongitude = 0",
+            "degrees below the horizon, where the model ends; write one when it is up",
+        ),
         ("[camera\nposition = 3", "is not valid TOML: "),
         (f"[camera]\nposition = [1{'0' * 5000}, 0, 0]", "is not valid TOML: "),
         (f"[camera]\nposition = [0x1{'0' * 5000}, 0, 0]", "camera.position: [0x10000"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +18,11 @@ from clrt.rendering.checkpoint.identity import facts_of
 from clrt.rendering.compile.choices import Choices
 from clrt.scene.animation import Animation, Keyframe
 from clrt.scene.editing import materials_of, with_material
-from clrt.scene.lights import PointLight
+from clrt.scene.lights import Light, PointLight
 from clrt.scene.materials.material_types import Dielectric, Diffuse, MetallicRoughness, Mirror
 from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.sky.sky import Sky
 
 from .glb import Gltf, ball
 from .test_gltf import cameras
@@ -227,6 +229,32 @@ def test_files_that_are_still_shown_stay(tmp_path: Path) -> None:
     assert {file: file.read_bytes() for file in old} == old and len(old) == 2
     again = [each.material.parameters()["color"] for each in load(path).meshes]
     assert [each.picture.texels[0, 0, 0] for each in again if isinstance(each, Texture)] == [10, 200]
+
+
+def test_skies_are_written_as_parameters_unless_they_were_changed(tmp_path: Path) -> None:
+    """Also of scenes made in Python. A sky that was edited, or whose sun was, is written as what it is now."""
+    sky = Sky(sun_direction=(1, 2, 3), turbidity=2.5, sun_angle_degrees=1.0)
+    lamp = PointLight(position=(0, 1, 2), intensity=(1, 1, 1))
+    scene = Scene(environment=sky.environment(), lights=[*sky.lights(), lamp])
+    read = again(scene, tmp_path / "sky.toml")
+    check_same(scene, read)
+    text = (tmp_path / "sky.toml").read_text()
+    assert tomllib.loads(text)["sky"] == {"sun_direction": [1, 2, 3], "turbidity": 2.5, "sun_angle_degrees": 1.0}
+    assert "[environment]" not in text and text.count("[[light]]") == 1 and len(list(tmp_path.iterdir())) == 1
+    time = datetime(2026, 6, 21, 3, 34, 56, tzinfo=UTC)
+    placed = Sky(time=time, latitude=-30, longitude=130 + 1 / 3, sun_strength=0)
+    check_same(other := Scene(environment=placed.environment()), again(other, tmp_path / "placed.toml"))
+    assert tomllib.loads((tmp_path / "placed.toml").read_text())["sky"]["time"] == time
+    changes: list[tuple[str, Environment, list[Light]]] = [
+        ("turned", replace(sky.environment(), rotation_degrees=9.0), sky.lights()),
+        ("brighter", replace(sky.environment(), strength=2.0), sky.lights()),
+        ("sunless", sky.environment(), []),
+        ("later", sky.environment(), [lamp, *sky.lights()]),
+    ]
+    for name, environment, lights in changes:
+        changed = Scene(environment=environment, lights=lights)
+        check_same(changed, again(changed, tmp_path / f"{name}.toml"))
+        assert "[sky]" not in (tmp_path / f"{name}.toml").read_text() and (tmp_path / f"{name}.sky.exr").exists()
 
 
 def test_numbers_of_numpy_are_written(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ NAMES = (
     "rough_glass",
     "agreement",
     "mitsuba_files",
+    "sky",
 )
 
 for name in sys.argv[1:] or NAMES:

@@ -34,13 +34,20 @@ def modernize(element: Element) -> None:
         _erect(element)
 
 
+#: Albedo of the ground below a sky, by default.
+OLD_ALBEDO = "0.2"
+
+
 def _erect(sky: Element) -> None:
-    """Turn a sky whose zenith is +y by default to Mitsuba 3's, whose zenith is +z."""
+    """Turn a sky whose zenith is +y, north −z and east +x to Mitsuba 3's: its zenith is +z, and it is mirrored, with
+    south along +x and west along +y."""
     transform = next((child for child in sky if child.tag == "transform"), None)
     if transform is None:
         transform = Element("transform", {"name": "to_world"}, sky.place)
         sky.children.append(transform)
-    transform.children.insert(0, Element("rotate", {"x": "1", "angle": "-90"}, sky.place))
+    transform.children.insert(0, Element("matrix", {"value": "0 -1 0 0 0 1 1 0 0"}, sky.place))
+    if not any(child.get("name") == "albedo" for child in sky):
+        sky.children.append(Element("spectrum", {"name": "albedo", "value": OLD_ALBEDO}, sky.place))
 
 
 def _place_textures(element: Element) -> None:

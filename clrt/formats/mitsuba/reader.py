@@ -136,9 +136,9 @@ class _Reader:
             if plugin.kind in ENVIRONMENTS:
                 sky = self._tried(lambda each: environment(each, self._notes), plugin)
             elif plugin.kind in SUN_AND_SKY:
-                above, sun = self._tried(lambda each: sun_and_sky(each, self._notes), plugin) or (None, None)
+                above, suns = self._tried(lambda each: sun_and_sky(each, self._notes), plugin) or (None, [])
                 sky = above or sky
-                lights.append(sun)
+                lights = [*suns, *lights]  # first, as in a scene file with the sky's parameters
             else:
                 lights.append(self._tried(lambda each: light(each, self._notes), plugin))
         return [each for each in lights if each], sky

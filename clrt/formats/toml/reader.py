@@ -18,6 +18,7 @@ from ...scene.materials.textures import WHITE, Texture
 from ...scene.model import Camera, Environment, Instance, Model, Origin, RenderSettings, Scene, Source, Sphere
 from ...scene.model_pose import with_poses
 from ...scene.provenance import material_of, parts_of
+from ...scene.sky.sky import Sky
 from ...scene.validation.field_types import field_problems, show, unknown, usable
 from ..images.image_reader import read_picture
 from ..referenced_files import name_of
@@ -36,6 +37,7 @@ SECTIONS = (
     "keyframe",
     "render",
     "environment",
+    "sky",
     "materials",
     "mesh",
     "instance",
@@ -65,12 +67,14 @@ class SceneReader:
         lens = self._table("camera")
         camera = Camera() if "name" in lens else self._camera(lens, "camera")
         render = self._build(RenderSettings, self._table("render"), "render")
-        environment = self._environment(self._table("environment"))
+        sky = self._sky()
+        environment = sky.environment() if sky else self._environment(self._table("environment"))
         for name, values in self._table("materials").items():
             where = f"materials.{name}"
             self._materials[name] = self._typed(MATERIALS, values, where) or Diffuse()
         spheres = [self._sphere(values, f"sphere[{i}]") for i, values in enumerate(self._tables("sphere"))]
-        lights: list[Light] = [
+        lights: list[Light] = sky.lights() if sky else []
+        lights += [
             self._typed(LIGHTS, values, f"light[{i}]") or SUN  # keeps the later ones' numbers
             for i, values in enumerate(self._tables("light"))
         ]
@@ -209,6 +213,19 @@ class SceneReader:
             if "color" in values:
                 self.problems.append("environment: has both a color and an image; keep one of them")
         return self._build(Environment, {**values, "image": image}, "environment")
+
+    def _sky(self) -> Sky | None:
+        """Return the analytic sky; None if there is none or if it is invalid."""
+        if "sky" not in self._document:
+            return None
+        if "environment" in self._document:
+            self.problems.append("sky: the scene has both [sky] and [environment]; keep one of them")
+        values = self._table("sky")
+        if values is not self._document["sky"]:
+            return None
+        problems = field_problems(Sky, values, "sky")
+        self.problems += problems
+        return None if problems else self._tried(lambda: Sky(**usable(Sky, values)))
 
     def _picture(self, name: Any) -> Any:
         if not isinstance(name, str):

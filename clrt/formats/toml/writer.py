@@ -25,6 +25,7 @@ from ...scene.materials.material_types import Diffuse
 from ...scene.materials.textures import Picture, Texture
 from ...scene.model import Environment, Instance, Mesh, Origin, Scene, Source
 from ...scene.provenance import material_of, shape_of
+from ...scene.sky.sky import Sky, SkyEnvironment
 from ...scene.validation.field_types import plain_value
 from ..gltf.glb_writer import mesh_glb
 from .texture_table import TextureTable
@@ -115,9 +116,10 @@ class _Writer:
             *self._cameras(),
             *self._animation(),
             *self._section("[render]", scene.render),
-            *self._environment(scene.environment),
         ]
-        for light in scene.lights:
+        sky = _sky_of(scene)
+        head += self._section("[sky]", sky) if sky else self._environment(scene.environment)
+        for light in scene.lights[len(sky.lights()) if sky else 0 :]:
             if id(light) not in self._moving:
                 head += self._section("[[light]]", light, light.kernel)
         for name, material in self._materials.items():
@@ -339,6 +341,16 @@ class _Writer:
             return Path(os.path.relpath(file, self._folder)).as_posix()
         except ValueError:  # on another drive
             return file.as_posix()
+
+
+def _sky_of(scene: Scene) -> Sky | None:
+    """Return the analytic sky that the environment and the first light are, unless these were changed."""
+    found = scene.environment
+    if not isinstance(found, SkyEnvironment):
+        return None
+    made, suns = found.sky.environment(), found.sky.lights()
+    same = all(np.array_equal(getattr(found, each.name), getattr(made, each.name)) for each in fields(Environment))
+    return found.sky if same and scene.lights[: len(suns)] == suns else None
 
 
 def _moves(table: Mapping[str, Any]) -> bool:

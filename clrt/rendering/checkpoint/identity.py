@@ -19,7 +19,7 @@ import numpy as np
 
 from ...device.programs.kernel_files import kernel_digest
 from ...scene.geometry.instancing import prototypes
-from ...scene.model import RenderSettings, Scene
+from ...scene.model import Environment, RenderSettings, Scene
 from ..compile.choices import Choices
 from ..compile.visible_parts import visible_parts
 
@@ -91,7 +91,10 @@ def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
 
 
 def _part(scene: Scene, name: str) -> object:
-    """Return a part of the scene; for instances each mesh once, and the transforms."""
+    """Return a part of the scene: for instances each mesh once, and the transforms; for an environment what it emits,
+    without the parameters of a sky."""
+    if name == "environment":
+        return Environment(**{each.name: getattr(scene.environment, each.name) for each in fields(Environment)})
     if name != "instances":
         return getattr(scene, name)
     meshes, which = prototypes(scene.instances)

@@ -9,6 +9,7 @@ import math
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
+from datetime import date, datetime, time
 from functools import lru_cache, reduce
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -78,6 +79,8 @@ def show(value: object) -> str:
         text = str(value).lower()
     elif isinstance(value, tuple):
         text = f"[{', '.join(show(entry) for entry in value[:20])}]"
+    elif isinstance(value, (date, time)):
+        text = value.isoformat()
     elif isinstance(value, dict):
         text = f"{{ {', '.join(f'{key} = {show(entry)}' for key, entry in value.items())} }}"
     else:
@@ -177,13 +180,14 @@ def _fault(kind: Any, value: Any) -> str:
     return _REMEDIES[kind]
 
 
-_ACCEPTED: dict[Any, Any] = {float: (float, int), int: int, str: str, bool: bool, tuple: tuple}
+_ACCEPTED: dict[Any, Any] = {float: (float, int), int: int, str: str, bool: bool, tuple: tuple, datetime: datetime}
 _REMEDIES = {
     float: "is not a number; write one without quotes",
     int: "is not an integer; write one without quotes or decimal point",
     str: "is not a string; write it in quotes",
     bool: "is not a boolean; write true or false",
     tuple: "is not a list; write the numbers in brackets",
+    datetime: "is not a date and time; write one without quotes, such as 2026-06-21T12:00:00+02:00",
 }
 _LIMITS: dict[type, tuple[Callable[[float, float], bool], str, str]] = {
     Ge: (operator.ge, "is below", "write at least"),

@@ -71,4 +71,5 @@ def _new(camera: Camera) -> dict[str, Light]:
 
 def _edited_sky(environment: Environment, step: float) -> Environment:
     """Show widgets for the environment; its color is hidden if it has an image, as it has no effect."""
-    return edit_fields(environment, step, without={"image"} | ({"color"} if environment.image is not None else set()))
+    without = {"image", "sky"} | ({"color"} if environment.image is not None else set())
+    return edit_fields(environment, step, without)
