@@ -10,7 +10,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
-from .goal import Goal
+from .goal import Goal, duration
 from .progress_reporter import PHASES, Progress, describe_workers, figures, where
 
 if TYPE_CHECKING:
@@ -86,7 +86,8 @@ class BarProgress(Progress):
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
-        self._frame = f"frame {number}, {done + 1} of {count}: "
+        left = "" if self._all_left is None else f", {duration(self._all_left)} left"
+        self._frame = f"frame {number}, {done + 1} of {count}{left}: "
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
@@ -98,7 +99,7 @@ class BarProgress(Progress):
                 f"{self._frame}{PHASES['render']}",
                 percent,
                 bar(goal.done(state)),
-                "" if left is None else f"{left:.0f} s left",
+                "" if left is None else f"{duration(left)} left",
                 *told,
                 self._where,
             ]

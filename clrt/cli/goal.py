@@ -34,6 +34,30 @@ class RenderSpeed:
         return (samples - before) / max(end - start, 1e-9)
 
 
+class FrameSpeed:
+    """Speed of rendering the frames of an animation. Suspended time, which the clock does not count, is left out."""
+
+    def __init__(self) -> None:
+        self._begun: tuple[float, int] | None = None
+
+    def left(self, now: float, done: int, count: int) -> float | None:
+        """Return the seconds until all `count` frames are done, of which `done` are; None before the first one is.
+
+        now: of a clock. The frames done at the first call do not count: they are from an earlier run.
+        """
+        if self._begun is None:
+            self._begun = now, done
+        start, before = self._begun
+        return (now - start) / (done - before) * (count - done) if done > before else None
+
+
+def duration(seconds: float) -> str:
+    """Format a time to go: in seconds below two minutes, then in minutes, then in hours."""
+    if seconds < 119.5:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7170 else f"{seconds / 3600:.1f} h"
+
+
 @dataclass(frozen=True)
 class Goal:
     """Stopping criteria, as far as known. percentile: of the tiles that must reach the error."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
+import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from .goal import Goal, RenderSpeed, time_left
+from .goal import FrameSpeed, Goal, RenderSpeed, duration, time_left
 from .streams import tell
 
 if TYPE_CHECKING:
@@ -27,7 +28,8 @@ class Progress:
     """Progress that shows nothing; base class of the others."""
 
     def __init__(self) -> None:
-        self._pace = RenderSpeed()
+        self._pace, self._frames = RenderSpeed(), FrameSpeed()
+        self._all_left: float | None = None
         self._workers: list[dict[str, Any]] = []
         self._bands = -1
 
@@ -49,6 +51,7 @@ class Progress:
     def frame(self, number: int, done: int, count: int) -> None:
         """Begin the frame with this number; `done` of the `count` frames to render are finished."""
         self._pace = RenderSpeed()
+        self._all_left = self._frames.left(time.monotonic(), done, count)
 
     def state(self, state: State, goal: Goal) -> None:
         """Show a state of the render."""
@@ -73,11 +76,12 @@ class PlainProgress(Progress):
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
-        tell(f"frame {number}, {done + 1} of {count}")
+        left = "" if self._all_left is None else f", about {duration(self._all_left)} left for all"
+        tell(f"frame {number}, {done + 1} of {count}{left}")
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
-        tell(self._told(state, goal) + (f"  about {left:.0f} s left" if left is not None else ""))
+        tell(self._told(state, goal) + (f"  about {duration(left)} left" if left is not None else ""))
 
     def bands(self, done: int, count: int) -> None:
         if done != self._bands:
@@ -112,7 +116,8 @@ class JsonProgress(Progress):
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
-        _tell_json({"phase": "frame", "frame": number, "done": done, "frames": count})
+        values = {"phase": "frame", "frame": number, "done": done, "frames": count, "seconds_left": self._all_left}
+        _tell_json(values)
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)

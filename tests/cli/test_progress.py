@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clrt.cli.goal import Goal, RenderSpeed, time_left
+from clrt.cli.goal import FrameSpeed, Goal, RenderSpeed, duration, time_left
 from clrt.rendering.compile.records import PIXEL
 from clrt.rendering.film.film import Film
 from clrt.rendering.renderer import State
@@ -102,3 +103,28 @@ def test_percentages_are_rounded_down() -> None:
     assert Goal(1000, None, None).percent(state(999, 3.0)) == " 99 %  "
     assert Goal(None, None, 0.1).percent(state(10, 3.0, 0.1001)) == " 99 %  "
     assert Goal(1000, None, None).percent(state(1000, 3.0)) == "100 %  "
+
+
+def test_frames_of_this_run_foretell_the_others() -> None:
+    """Five frames are from an earlier run; those of this one take 2 s each."""
+    speed = FrameSpeed()
+    assert speed.left(100.0, 5, 20) is None
+    for done in range(6, 21):
+        assert speed.left(100.0 + 2 * (done - 5), done, 20) == pytest.approx(2 * (20 - done))
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.4, "0 s"), (119, "119 s"), (120, "2 min"), (7100, "118 min"), (7200, "2.0 h"), (1e6, "277.8 h")],
+)
+def test_durations_are_short(seconds: float, text: str) -> None:
+    assert duration(seconds) == text
+
+
+def test_frames_tell_the_time_left_for_all(tmp_path: Path) -> None:
+    result = render(tmp_path, "--turntable", "3", "--progress", "json", "-o", "view_#.png")
+    frames = [each for each in map(json.loads, result.stderr.splitlines()) if each["phase"] == "frame"]
+    assert [each["done"] for each in frames] == [0, 1, 2] and frames[0]["seconds_left"] is None
+    assert all(each["seconds_left"] > 0 for each in frames[1:])
+    plain = render(tmp_path, "--turntable", "3", "--progress", "plain", "-o", "view_#.png", "--force")
+    assert len(re.findall(r"^frame \d, [23] of 3, about \d+ s left for all$", plain.stderr, re.MULTILINE)) == 2
