@@ -9,17 +9,19 @@ from typing import Literal, NamedTuple
 
 #: Source of its values. mean, center: the function seen_NAME of kernels/aov/first_hit.cl, averaged over a pixel's
 #: camera rays or for the ray through its center; hits: those, on the host (clrt/rendering/accumulation/first_hits.py);
-#: film: the film (clrt/rendering/aovs.py).
-Source = Literal["mean", "center", "hits", "film"]
+#: coverage: what each of a pixel's camera rays hits, likewise; film: the film (clrt/rendering/aovs.py).
+Source = Literal["mean", "center", "hits", "coverage", "film"]
 #: How a .png shows it (clrt/output/aov_files.py).
-Display = Literal["light", "error", "color", "direction", "position", "depth", "count", "id"]
+Display = Literal["light", "error", "color", "direction", "position", "depth", "count", "id", "matte"]
+#: Channels of three layers, of two ids and coverages each.
+CRYPTOMATTE = tuple(f"{layer:02}.{channel}" for layer in range(3) for channel in "RGBA")
 
 
 class AovType(NamedTuple):
-    """Entry of the table. channels: their names, one or three. reads: what its seen_NAME reads in addition to the
-    geometry: the shading normal, with normal maps, or the BSDF."""
+    """Entry of the table. channels: their names, one or three, or of Cryptomatte's layers. reads: what its seen_NAME
+    reads in addition to the geometry: the shading normal, with normal maps, or the BSDF."""
 
-    channels: str
+    channels: str | tuple[str, ...]
     source: Source
     display: Display
     reads: Literal["", "normal", "bsdf"] = ""
@@ -34,11 +36,19 @@ AOV_TYPES = {
     "primitive": AovType("X", "hits", "id"),
     "object": AovType("X", "hits", "id"),
     "material": AovType("X", "hits", "id"),
+    "crypto_object": AovType(CRYPTOMATTE, "coverage", "matte"),
+    "crypto_material": AovType(CRYPTOMATTE, "coverage", "matte"),
     "direct": AovType("RGB", "film", "light"),
     "indirect": AovType("RGB", "film", "light"),
     "variance": AovType("RGB", "film", "error"),
     "samples": AovType("X", "film", "count"),
 }
+
+
+def channel_names(aov: str) -> list[str]:
+    """Return the names of its channels in a file."""
+    channels = AOV_TYPES[aov].channels
+    return [f"{aov}.{channel}" if isinstance(channels, str) else f"{aov}{channel}" for channel in channels]
 
 
 def aovs_from(*sources: Source) -> tuple[str, ...]:

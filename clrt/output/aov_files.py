@@ -9,15 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..aov_types import AOV_TYPES
+from ..aov_types import AOV_TYPES, channel_names
 from .file_formats import is_shown
 from .view_transform import to_display
 
 FloatArray = NDArray[np.float32]
 Pictures = Mapping[str, NDArray[np.generic]]
 
-#: Channel names of the AOVs.
-CHANNELS = {name: kind.channels for name, kind in AOV_TYPES.items()}
 #: Largest integer up to which float32 represents all integers.
 LARGEST_ID = 1 << 24
 _log = logging.getLogger(__name__)
@@ -28,7 +26,7 @@ def layered(pixels: FloatArray, aovs: Pictures) -> tuple[FloatArray, list[str]]:
     for name, aov in aovs.items():
         if aov.dtype.kind in "iu" and aov.max(initial=0) > LARGEST_ID:
             _log.warning("%s: numbers above %d are rounded in an .exr; Image.aovs has the exact ones", name, LARGEST_ID)
-    names = [*"RGB", *(f"{name}.{channel}" for name in aovs for channel in CHANNELS[name])]
+    names = [*"RGB", *(channel for name in aovs for channel in channel_names(name))]
     layers = [aov.astype(np.float32).reshape(*aov.shape[:2], -1) for aov in aovs.values()]
     return np.concatenate([pixels, *layers], axis=2), names
 
@@ -61,6 +59,9 @@ def drawn(name: str, aov: NDArray[np.generic], view: str, exposure: float) -> ND
             shown = values / max(values.max(), 1)
         case "id":
             shown = _colors_of(aov)
+        case "matte":
+            ids = np.ascontiguousarray(values[..., ::2]).view(np.uint32)
+            shown = np.sum(_colors_of(ids) * values[..., 1::2, None], axis=2)
     return to_display(np.broadcast_to(shown, (*aov.shape[:2], 3)).astype(np.float32), "raw")
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..file_names import printable
+from ..scene.cryptomatte import header_entries
 from .atomic_files import check_target, replacing
 from .json_text import json_text
 
@@ -24,7 +25,9 @@ def write_report(path: Path, report: Mapping[str, Any]) -> Path:
 
 
 def header_of(report: Mapping[str, Any]) -> dict[str, str]:
-    """Return the report's scalar values, for an image file's header."""
-    return {
-        f"clrt:{key}": printable(str(value)) for key, value in report.items() if isinstance(value, (str, int, float))
-    }
+    """Return the report's scalar values, and Cryptomatte's manifests, for an image file's header."""
+    scalars = {key: value for key, value in report.items() if isinstance(value, (str, int, float))}
+    header = {f"clrt:{key}": printable(str(value)) for key, value in scalars.items()}
+    for aov, manifest in report.get("cryptomatte", {}).items():
+        header |= header_entries(aov, manifest)
+    return header

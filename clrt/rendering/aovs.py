@@ -72,7 +72,7 @@ def check_light(names: Iterable[str], integrator: str) -> None:
 
 def seen_first(names: Iterable[str]) -> tuple[str, ...]:
     """Return the names of the first-hit AOVs among them (`first_hits`)."""
-    return tuple(name for name in names if name in aovs_from("mean", "center", "hits"))
+    return tuple(name for name in names if name in aovs_from("mean", "center", "hits", "coverage"))
 
 
 @with_default_errors

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..scene.cryptomatte import NAMES, manifest_of
 from .checkpoint.identity import scene_hash, values_of
 from .compile.features import biased_by
 from .renderer import Renderer, State
@@ -35,11 +36,17 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
         "biased_by": (biases := biased_by(settings)),
         "warnings": renderer.warnings.of(state.film),
         **({"clamped_part": state.film.clamped_part} if biases else {}),
+        **({"cryptomatte": found} if (found := _manifests(renderer)) else {}),
         **renderer.session.machine(renderer.devices),
         "history": renderer.history,
         **({} if state.tile_noise is None else {"tile_noise": state.tile_noise}),
         **({} if state.relmse is None else {"relmse": state.relmse, "noise_ratio": state.noise_ratio}),
     }
+
+
+def _manifests(renderer: Renderer) -> dict[str, dict[str, str]]:
+    """Return the manifest of each Cryptomatte layer among the AOVs."""
+    return {name: manifest_of(renderer.scene, name) for name in renderer.first_hits if name in NAMES}
 
 
 def _version() -> str:

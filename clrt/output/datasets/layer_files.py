@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...aov_types import AOV_TYPES
+from ...aov_types import channel_names
 from ...scene.model import Camera
 from ..images import write_channels, write_image
 
@@ -36,12 +36,14 @@ def save_view(folder: Path, name: str, camera: Camera, layers: Layers) -> SavedV
     if image:
         write_image(folder / image, layers["rgb"].astype(np.float32))
     if others:
-        channels = [f"{key}.{channel}" for key in others for channel in _channels(key)]
+        channels = [channel for key in others for channel in _channels(key)]
         samples = np.concatenate([layer.astype(np.float32) for layer in others.values()], axis=2)
         write_channels(folder / layers_file, samples, channels)
     height, width = next(iter(layers.values())).shape[:2]
     return SavedView(camera, (width, height), layers, image or layers_file, layers_file)
 
 
-def _channels(name: str) -> str:
-    return OTHER_CHANNELS[name] if name in OTHER_CHANNELS else AOV_TYPES[name].channels
+def _channels(name: str) -> list[str]:
+    if name in OTHER_CHANNELS:
+        return [f"{name}.{channel}" for channel in OTHER_CHANNELS[name]]
+    return channel_names(name)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...aov_types import AOV_TYPES, aovs_from
 from ...device.programs.preamble import typedefs
 from ...device.programs.struct_types import record
+from ...scene.cryptomatte import NAMES, RANKS, ids_of
 from ...scene.model import Scene
 from ...scene.numbered_objects import materials_of
 from ..compile.compile_scene import CompiledScene
@@ -37,13 +38,15 @@ def first_hits(session: Accumulation, scene: Scene, names: Collection[str]) -> d
     missed = seen["primitive"] < 0
     if "position" in centers:
         pictures |= _places(session, seen["position"].astype(np.float64), missed)
+    if layers := [name for name in aovs_from("coverage") if name in names]:
+        pictures |= coverage(session, scene, layers)
     ids = _ids(session, scene, seen)
     pictures |= {name: np.where(missed, -1, numbers).astype(np.int32) for name, numbers in ids.items()}
     return {name: picture for name, picture in pictures.items() if name in names}
 
 
-def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[str, np.dtype[Any]]:
-    """Return the program text, with only what `names` needs, and the record that it writes."""
+def first_hit_program(compiled: CompiledScene, names: Collection[str], *preamble: str) -> tuple[str, np.dtype[Any]]:
+    """Return the program text, with only what `names` needs, and the record that it writes. preamble: definitions."""
     means, centers = _seen(names)
     fields = {"primitive": "i4", "instance": "i4", "pad": "2i4"}
     for name in means + centers:
@@ -61,6 +64,7 @@ def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[
         f"#define SEEN_MATERIALS {len(materials)}",
         typedefs({"FirstHit": kind}),
         *defines,
+        *preamble,
         SEEN_FILES=materials,
     ), kind
 
@@ -89,6 +93,32 @@ def _places(
         "position": np.where(missed[..., None], 0, seen / frame.unit + frame.center).astype(np.float32),
         "depth": np.where(missed, np.inf, depth).astype(np.float32),
     }
+
+
+def coverage(session: Accumulation, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
+    """Return Cryptomatte layers (height, width, 2 RANKS): what SAMPLES camera rays per pixel hit first, by coverage."""
+    source, kind = first_hit_program(session.compiled, (), "#define ONE_SAMPLE 1")
+    hits: dict[str, list[NDArray[np.int64]]] = {name: [] for name in names}
+    for number in range(SAMPLES):
+        seen = render_pixels(session, source, "first_hit", kind, SAMPLES, number)
+        missed, ids = seen["primitive"] < 0, _ids(session, scene, seen)
+        for name in names:
+            hits[name].append(np.where(missed, -1, ids[name.removeprefix("crypto_")]))
+    return {name: ranked(np.stack(hits[name], axis=-1), ids_of(NAMES[name](scene))) for name in names}
+
+
+def ranked(hits: NDArray[np.int64], ids: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return pairs of id and coverage, (…, 2 RANKS), for numbers of what samples (…, n) hit, −1 for nothing."""
+    distinct = np.unique(ids[hits[hits >= 0]])
+    covered = [np.mean((hits >= 0) & (ids[hits] == each), axis=-1) for each in distinct]
+    shares = np.stack(covered or [np.zeros(hits.shape[:-1])])
+    order = np.argsort(-shares, axis=0, kind="stable")[:RANKS]
+    best = np.take_along_axis(shares, order, axis=0)
+    pairs = np.zeros((*hits.shape[:-1], RANKS, 2), np.float32)
+    pairs[..., : len(order), 1] = np.moveaxis(best, 0, -1)
+    if len(distinct):
+        pairs[..., : len(order), 0] = np.moveaxis(np.where(best > 0, distinct[order], 0), 0, -1)
+    return pairs.reshape(*hits.shape[:-1], 2 * RANKS)
 
 
 def _ids(session: Accumulation, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:

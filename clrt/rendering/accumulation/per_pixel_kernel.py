@@ -19,12 +19,14 @@ from .launch_plan import FEWEST_TILES, FIRST_LAUNCH_SAMPLES, block_bits, first_l
 from .scene_on_device import WINDOW, WINDOWS
 
 
-def render_pixels(session: Accumulation, source: str, name: str, record: np.dtype[Any], samples: int) -> NDArray[Any]:
+def render_pixels(
+    session: Accumulation, source: str, name: str, record: np.dtype[Any], samples: int, first_sample: int = 0
+) -> NDArray[Any]:
     """Return (height, width) records of the session's image, written by kernel `name` of a program in bounded launches.
 
-    The kernel takes the scene, the records of a launch, the tiles and the launch, like `path`. samples: sample count in
-    the launch record. Raises KernelError and DeviceError if the device fails, and UsageError if the renderer was made
-    without `first_hits` and traces no rays.
+    The kernel takes the scene, the records of a launch, the tiles and the launch, like `path`. samples, first_sample:
+    in the launch record. Raises KernelError and DeviceError if the device fails, and UsageError if the renderer was
+    made without `first_hits` and traces no rays.
     """
     if session.compiled.tree is NO_RAYS:
         raise UsageError(
@@ -40,7 +42,8 @@ def render_pixels(session: Accumulation, source: str, name: str, record: np.dtyp
     pixels = np.zeros((len(order), TILE_PIXELS), record)
     first = min(FIRST_LAUNCH_SAMPLES, first_launch_samples(session.compiled))
     launch, launches, done = session.launch.copy(), Launches(first), 0
-    launch["first_sample"], launch["sample_count"], launch["block_bits"] = 0, samples, block_bits(samples)
+    launch["first_sample"], launch["sample_count"] = first_sample, samples
+    launch["block_bits"] = block_bits(samples)
     work = TILE_PIXELS * max(samples, 1)
     while done < len(order):
         count = min(len(order) - done, most, max(FEWEST_TILES, launches.size // work))
