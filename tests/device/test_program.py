@@ -36,6 +36,7 @@ from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.geometry import instancing
 from clrt.scene.materials.material_types import MATERIALS
 from clrt.scene.model import Environment, Scene, Sphere
+from clrt.scene.ray_list import RayList
 from clrt.scene.render_settings import Filter, Sampler
 
 from ..covering import others
@@ -132,7 +133,9 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     used |= set(compile_scene(everything(), Choices(layout="packs")).files)
     for paths in get_args(Paths):
         used |= set(compile_scene(everything(), Choices(paths=paths)).files)
-    used |= set(compile_scene(Scene(spheres=[Sphere()]), Choices(paths="queues")).files)  # one material type
+    used |= set(compile_scene(Scene(spheres=[Sphere()]), Choices(paths="queues")).files)  # no microfacets
+    rays = RayList(origins=np.zeros((1, 3)), directions=np.array([[0.0, 1.0, 0.0]], np.float32), receivers=True)
+    used |= set(compile_scene(replace(everything(), camera=rays), Choices(paths="lanes")).files)
     for sampler, name in zip(get_args(Sampler), get_args(Filter)):
         scene = everything()
         scene.render = replace(scene.render, sampler=sampler, filter=name)
