@@ -386,7 +386,7 @@ def one_minus_cos(degrees: float) -> float:
 def _projection(
     light: SpotLight | ProjectorLight, image: LightImage, tangent: float, aspect: float = 1.0
 ) -> dict[str, Parameter]:
-    """Return the parameters of an image seen along the axis (kernels/light/projection.cl). tangent: of half its
+    """Return the parameters of an image seen along the axis (kernels/light/image.cl). tangent: of half its
     vertical angle; aspect: width over height."""
     right, top = image_axes(light.direction, light.up)
     across, upwards = _vector(right / (tangent * aspect)), _vector(top / tangent)
