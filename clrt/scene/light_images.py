@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -48,7 +47,7 @@ class LightImage:
         """Width over height."""
         return float(self.pixels.shape[1] / len(self.pixels))
 
-    @cached_property
+    @property
     def typical(self) -> NDArray[np.float64]:
         """(3,): the root mean square of the pixels, positive unless they are black."""
         return np.asarray(np.sqrt(np.mean(np.square(self.pixels, dtype=np.float64), axis=(0, 1))))

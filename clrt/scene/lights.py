@@ -2,8 +2,8 @@
 
 To add one: write its kernel file, write its dataclass here and list it in `Light`, where the scene file, the
 validation, the packing, the window and random scenes find it. A name means the same in all types: `position`, the
-`direction` in which the light travels, the STRENGTHS, and what LENGTHS lists. Area lights are meshes and spheres with
-an emissive material; see also `Environment`.
+`direction` in which the light travels, what is `up` in its `image`, the STRENGTHS, and what LENGTHS lists. Area lights
+are meshes and spheres with an emissive material; see also `Environment`.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class BaseLight(ABC):
     @property
     def is_black(self) -> bool:
         """Whether it emits nothing."""
-        dark = self.shows is not None and not self.shows.typical.any()
+        dark = self.shows is not None and not self.shows.pixels.any()
         return dark or not any(any(value) for name, value in vars(self).items() if name in STRENGTHS)
 
     def in_unit(self: Self, unit: float) -> Self:
