@@ -166,6 +166,8 @@ def test_mistakes_are_named(folder: Path) -> None:
     assert '"filename" is an image of 3x2 pixels; give a square one' in said
     said = problem(folder, 'Scale 1 2 1 LightSource "projection" "string filename" "wide.exr"')
     assert 'LightSource "projection": its transformation shears or stretches' in said
+    said = problem(folder, 'LightSource "projection" "string filename" "wide.exr" "float fov" 180')
+    assert 'LightSource "projection": "fov" is 180; write more than 0 and less than 180 degrees' in said
     said = problem(folder, 'LightSource "projection" "string filename" "none.exr"')
     assert "none.exr: no such picture file" in said
 

@@ -33,7 +33,10 @@ def projection(entity: Entity, spectra: Spectra, notes: Notes, mirror: Doubles, 
     image = _image(entity, notes, old)
     axes, (across, _, along) = _axes(entity, mirror)
     wide, high = _half_size(image.aspect)
-    spread = tan(radians(entity.number("fov", 45.0 if old else 90.0)) / 2)
+    fov = entity.number("fov", 45.0 if old else 90.0)
+    if not 0 < fov < 180:
+        raise entity.fault("fov", f"is {fov:g}", "write more than 0 and less than 180 degrees")
+    spread = tan(radians(fov) / 2)
     strength = spectra.emission(entity, "I")
     if not old:
         strength = powered(strength, entity, _flux(image, spread * wide, spread * high))
