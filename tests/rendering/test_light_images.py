@@ -25,8 +25,8 @@ from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, RenderSettings, Scene
 from clrt.scene.validation.validate import scene_problems
 
+from ..oracle.lights import arriving as facing
 from .pictures import film, pixel_points, quad
-from .test_spots import fade
 
 Doubles = NDArray[np.float64]
 KINDS: list[type[SpotLight | ProjectorLight | GoniometricLight]] = [SpotLight, ProjectorLight, GoniometricLight]
@@ -37,64 +37,6 @@ def arriving(device: Device, light: Light, points: Doubles) -> Doubles:
     """Return the irradiance (n, 3) of surfaces that face the light at points (n, 3)."""
     normals = np.tile(UP, (len(points), 1))
     return Probe(device, Scene(lights=[light]))("light_sample", 12, points, normals, seed=1)[:, 3:6]
-
-
-def wrapped(index: Any, size: int, wrap: str) -> Any:
-    """Return the texel that stands for one outside the image."""
-    if wrap == "mirror":
-        index = index % (2 * size)
-        return np.minimum(index, 2 * size - 1 - index)
-    return index % size if wrap == "repeat" else index.clip(0, size - 1)
-
-
-def looked_up(image: LightImage, default: tuple[str, str], u: Doubles, v: Doubles) -> Doubles:
-    """Return the image (n, 3) at its coordinates: scaled, rotated counter-clockwise, translated."""
-    height, width = image.pixels.shape[:2]
-    angle = np.radians(image.rotation_degrees)
-    u, v = u * image.scale[0], v * image.scale[1]
-    u, v = (
-        u * np.cos(angle) + v * np.sin(angle) + image.offset[0],
-        v * np.cos(angle) - u * np.sin(angle) + image.offset[1],
-    )
-    x, y = u * width - 0.5, v * height - 0.5
-    wraps = image.wrap or default
-    if image.filter == "nearest":
-        x, y = np.floor(x + 0.5), np.floor(y + 0.5)
-    found = np.zeros((len(u), 3))
-    for column, row in ((0, 0), (1, 0), (0, 1), (1, 1)):
-        left, top = np.floor(x).astype(int), np.floor(y).astype(int)
-        weight = (1 - np.abs(x - left - column)) * (1 - np.abs(y - top - row))
-        at = wrapped(top + row, height, wraps[1]), wrapped(left + column, width, wraps[0])
-        found += weight[:, None] * image.pixels[at]
-    return found
-
-
-def expected(light: SpotLight | ProjectorLight | GoniometricLight, points: Doubles) -> Doubles:
-    """Return intensity·image/d² (n, 3), from the descriptions in docs/scene-format.md."""
-    forward = np.array(light.direction) / np.linalg.norm(light.direction)
-    right = np.cross(forward, light.up)
-    right /= np.linalg.norm(right)
-    top = np.cross(right, forward)
-    away = points - light.position
-    x, y, z = away @ right, away @ top, away @ forward
-    d = np.linalg.norm(away, axis=1)
-    image = light.image
-    assert image is not None
-    if isinstance(light, GoniometricLight):
-        u, v = 0.5 + np.arctan2(x, z) / (2 * np.pi), np.arccos(y / d) / np.pi
-        share, default = np.ones(len(d)), ("repeat", "clamp")
-    else:
-        half = light.outer_degrees if isinstance(light, SpotLight) else light.fov_degrees / 2
-        high = np.tan(np.radians(half))
-        wide = high if isinstance(light, SpotLight) else high * image.pixels.shape[1] / len(image.pixels)
-        u, v = 0.5 + 0.5 * x / (z * wide), 0.5 - 0.5 * y / (z * high)
-        share, default = (z > 0) * (0 <= u) * (u <= 1) * (0 <= v) * (v <= 1), ("clamp", "clamp")
-        if isinstance(light, SpotLight):
-            share = fade(light, points)
-        elif light.image_of == "irradiance":
-            share = share * (d / z) ** 3
-    share = np.where(share > 0, share, 0) / d**2
-    return np.asarray(light.intensity * looked_up(image, default, u, v) * share[:, None])
 
 
 def random_light(kind: type[Any], rng: np.random.Generator, **given: Any) -> Any:
@@ -129,7 +71,7 @@ def test_images_are_seen_from_the_light(device: Device, kind: type[Any]) -> None
         aside = rng.uniform(-1, 1, (300, 3)) * (9.0 if kind is GoniometricLight else rng.uniform(0, 1, (300, 1)))
         points = light.position + (forward + aside) * rng.uniform(0.5, 3, (300, 1))
         points = points.astype(np.float32).astype(np.float64)
-        right = expected(light, points)
+        right = facing(light, points)[2]
         found = arriving(device, light, points)
         assert np.count_nonzero(right.any(axis=1)) > 10
         np.testing.assert_allclose(found, right, rtol=2e-4, atol=2e-5 * right.max())
