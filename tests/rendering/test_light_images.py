@@ -203,8 +203,9 @@ def test_scene_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ('image = "no.png"', "light[0].image.image: "),
-        ("image = 3", "light[0].image.image: 3 is not a string"),
+        ('image = "no.png"', "light[0].image: "),
+        ("image = 3", "light[0].image: 3 is not a string"),
+        ('image = { image = "no.png" }', "light[0].image.image: "),
         ('image = { image = "slide.png", factor = 2 }', 'light[0].image: key "factor" is unknown'),
         ('image = { image = "slide.png", wrap = "around" }', 'light[0].image.wrap[0]: "around" is unknown'),
         ('image = "slide.png"\nup = [0, 0, 3]', "light[0].up: is parallel to the direction"),

@@ -196,8 +196,9 @@ class SceneReader:
 
     def _light(self, values: Any, where: str) -> Light | None:
         if isinstance(values, dict) and "image" in values:
-            table = values["image"] if isinstance(values["image"], dict) else {"image": values["image"]}
-            values = {**values, "image": self._tried(self._textures.light_image, table, f"{where}.image")}
+            name = values["image"]
+            table = (name, f"{where}.image") if isinstance(name, dict) else ({"image": name}, where)
+            values = {**values, "image": self._tried(self._textures.light_image, *table)}
         return self._typed(LIGHTS, values, where)
 
     def _texture(self, values: Table, where: str) -> Texture:
