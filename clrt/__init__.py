@@ -37,7 +37,14 @@ if TYPE_CHECKING:
     from .rendering.views import each_view as each_view, render_views as render_views
     from .scene.animation import Animation as Animation, Keyframe as Keyframe
     from .scene.camera_path import frames as frames, turntable as turntable
-    from .scene.lights import DirectionalLight as DirectionalLight, PointLight as PointLight, SpotLight as SpotLight
+    from .scene.light_images import LightImage as LightImage
+    from .scene.lights import (
+        DirectionalLight as DirectionalLight,
+        GoniometricLight as GoniometricLight,
+        PointLight as PointLight,
+        ProjectorLight as ProjectorLight,
+        SpotLight as SpotLight,
+    )
     from .scene.materials.material_types import (
         BlinnPhong as BlinnPhong,
         Conductor as Conductor,
@@ -79,7 +86,8 @@ _HOME = {
     "rendering.views": ("each_view", "render_views"),
     "scene.animation": ("Animation", "Keyframe"),
     "scene.camera_path": ("frames", "turntable"),
-    "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
+    "scene.light_images": ("LightImage",),
+    "scene.lights": ("DirectionalLight", "GoniometricLight", "PointLight", "ProjectorLight", "SpotLight"),
     "scene.materials.material_types": (
         "BlinnPhong",
         "Conductor",

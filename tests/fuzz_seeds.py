@@ -77,6 +77,12 @@ material = "my ring"
 type = "point"
 position = [1.5, 4, 3]
 intensity = [60, 58, 50]
+[[light]]
+type = "projector"
+position = [1, 4, 3]
+direction = [0, -1, -0.5]
+intensity = [9, 9, 9]
+image = { image = "wood.png", scale = [-1, 1], wrap = ["clamp", "mirror"] }
 """
 MTL = """newmtl a
 Kd 0.5 0.25 0.125
@@ -118,6 +124,8 @@ MITSUBA = """<scene version="3.0.0">
 </shape>
 <shape type="disk"><emitter type="area"><spectrum name="radiance" value="400:1, 500:3, 700:6"/></emitter></shape>
 <emitter type="spot"><rgb name="intensity" value="#ff8000"/><float name="cutoff_angle" value="30"/></emitter>
+<emitter type="projector"><float name="fov" value="30"/><texture type="bitmap" name="irradiance">
+<string name="filename" value="wood.png"/></texture></emitter>
 <emitter type="envmap"><string name="filename" value="sky.hdr"/><float name="scale" value="2"/></emitter></scene>
 """
 MITSUBA_0 = """<scene version="0.6.0">
@@ -134,6 +142,7 @@ LookAt 1 -7 3  0 0 1  0 0 1
 Camera "perspective" "float fov" 50 "float lensradius" .1
 WorldBegin
 LightSource "infinite" "string filename" "sky.hdr" "float scale" 2
+LightSource "projection" "string filename" "wood.png" "float fov" 40 "float power" 9
 LightSource "spot" "blackbody I" 3000 "float power" 100 "point3 from" [1 2 3] "float coneangle" 40
 Texture "wood" "spectrum" "imagemap" "string filename" "wood.png" "float uscale" 2 "bool invert" true
 Texture "board" "spectrum" "checkerboard" "rgb tex1" [.8 .3 .2] "rgb tex2" [.1 .1 .1]

@@ -8,6 +8,7 @@ from dataclasses import fields
 from typing import Any
 
 from ..scene.editing import materials_of
+from ..scene.light_images import LightImage
 from ..scene.materials.textures import Texture
 from ..scene.model import Environment, Instance, Mesh, Scene, Sphere
 from ..scene.provenance import material_of
@@ -41,7 +42,7 @@ def materials_in(scene: Scene) -> list[dict[str, Any]]:
 def lights_in(scene: Scene) -> list[dict[str, Any]]:
     """Return the scene's lights, its environment unless black, and each emissive object with its radiance."""
     rows = [
-        {"type": light.kernel, **{each.name: getattr(light, each.name) for each in fields(light)}}
+        {"type": light.kernel, **{each.name: _shown(getattr(light, each.name)) for each in fields(light)}}
         for light in scene.lights
     ]
     rows += _environment(scene.environment)
@@ -51,6 +52,14 @@ def lights_in(scene: Scene) -> list[dict[str, Any]]:
         if any(material.radiance):
             rows.append({"type": type(each).__name__.lower(), "name": each.name, "radiance": material.radiance})
     return rows
+
+
+def _shown(value: Any) -> Any:
+    """Return a light's field, for an image its name and size."""
+    if not isinstance(value, LightImage):
+        return value
+    height, width = value.pixels.shape[:2]
+    return f"{value.name} ({width}x{height})"
 
 
 def _environment(sky: Environment) -> Iterator[dict[str, Any]]:

@@ -2,8 +2,8 @@
 
 To add one: write its kernel file, write its dataclass here and list it in `Light`, where the scene file, the
 validation, the packing, the window and random scenes find it. A name means the same in all types: `position`, the
-`direction` in which the light travels, the STRENGTHS, and what LENGTHS lists. Area lights are meshes and spheres with
-an emissive material; see also `Environment`.
+`direction` in which the light travels, what is `up` in its `image`, the STRENGTHS, and what LENGTHS lists. Area lights
+are meshes and spheres with an emissive material; see also `Environment`.
 """
 
 from __future__ import annotations
@@ -11,17 +11,22 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from math import pi, radians, sin, sqrt
+from math import atan, degrees, hypot, pi, radians, sin, sqrt, tan
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .fields.limits import Ge, Gt, Le, Lt
 from .fields.tuples import tuples_for_lists
+from .light_images import WHITE_IMAGE, LightImage
 from .materials.material import Radiance
 
 Length = Annotated[float, Gt(0)]
 Vector = tuple[float, float, float]
+Doubles = NDArray[np.float64]
+#: What a kernel file reads: numbers, triples, and the image of a light.
+Parameter = float | Vector | LightImage
 
 #: Fields that say how bright a light is.
 STRENGTHS = ("intensity", "irradiance", "radiance")
@@ -32,14 +37,16 @@ LENGTHS = {"range": 1, "radius": 1, "intensity": 2}
 SMALLEST_DEGREES = 1e-4
 #: Minimum width of a spot's falloff in the cosine, and minimum square of a range: the inverse must fit in float32.
 STEEPEST = 1e-30
+#: Smallest sine of the angle between the axis of an image and what is up in it.
+SLANT = 1e-6
 
 
 class Bounds(NamedTuple):
     """Bounds of a light, at most `radius` from `center`, for light sampling (kernels/light/importance.cl).
 
-    intensity: W/sr where it is brightest. axis: unit, the normal of what emits on one side, or the axis of a cone; None
-    for a light that emits in all directions. height: 1 − the cosine of the cone's angle, None for a hemisphere; the
-    light then has the feature LIGHT_CONES.
+    intensity: W/sr where it is brightest, or that of an image's `typical` pixel. axis: unit, the normal of what emits
+    on one side, or the axis of a cone; None for a light that emits in all directions. height: 1 − the cosine of the
+    cone's angle, None for a hemisphere; the light then has the feature LIGHT_CONES.
     """
 
     center: Vector
@@ -83,7 +90,7 @@ class BaseLight(ABC):
         return self.kernel
 
     @abstractmethod
-    def parameters(self) -> dict[str, float | Vector]:
+    def parameters(self) -> dict[str, Parameter]:
         """Return the values its kernel file reads: numbers and triples, the same names for all that it samples."""
 
     @abstractmethod
@@ -96,13 +103,22 @@ class BaseLight(ABC):
 
     def conflicts(self) -> list[str]:
         """Return what is wrong with its fields beyond their types: "FIELD: fault; remedy"."""
-        fault = "direction: [0, 0, 0] is not a direction; write the one the light travels in"
-        return [] if any(getattr(self, "direction", (1,))) else [fault]
+        if not any(getattr(self, "direction", (1,))):
+            return ["direction: [0, 0, 0] is not a direction; write the one the light travels in"]
+        if self.shows is None or upright(self.direction, self.up):  # type: ignore[attr-defined]
+            return []
+        return ["up: is parallel to the direction, or [0, 0, 0]; write another, such as [0, 0, -1]"]
+
+    @property
+    def shows(self) -> LightImage | None:
+        """The image that it projects; None for lights without one."""
+        return None
 
     @property
     def is_black(self) -> bool:
         """Whether it emits nothing."""
-        return not any(any(value) for name, value in vars(self).items() if name in STRENGTHS)
+        dark = self.shows is not None and not self.shows.pixels.any()
+        return dark or not any(any(value) for name, value in vars(self).items() if name in STRENGTHS)
 
     def in_unit(self: Self, unit: float) -> Self:
         """Return the light for a scene whose lengths are all multiplied by `unit`; it is not moved."""
@@ -126,7 +142,7 @@ class PointLight(BaseLight):
     intensity: Radiance
     range: Length | None = None
 
-    def parameters(self) -> dict[str, float | Vector]:
+    def parameters(self) -> dict[str, Parameter]:
         return {"position": self.position, "intensity": self.intensity, "per_range2": _per_range2(self.range)}
 
     def bounds(self) -> Bounds:
@@ -141,7 +157,8 @@ class SpotLight(BaseLight):
     """Spot light of `intensity` W/sr in a cone around `direction`.
 
     It falls from `inner_degrees` to zero at `outer_degrees`. falloff: "cosine" as in glTF's KHR_lights_punctual, or
-    linearly in the "angle" as in Mitsuba. `range`: as PointLight's.
+    linearly in the "angle" as in Mitsuba. `range`: as PointLight's. image: multiplies the intensity; its square touches
+    the outer cone, with `up` as far up as possible.
     """
 
     kernel: ClassVar[str] = "spot"
@@ -152,9 +169,24 @@ class SpotLight(BaseLight):
     outer_degrees: Annotated[float, Gt(0), Le(90)] = 45.0
     falloff: Literal["cosine", "angle"] = "cosine"
     range: Length | None = None
+    image: LightImage | None = None
+    up: Vector = (0.0, 1.0, 0.0)
 
-    def parameters(self) -> dict[str, float | Vector]:
+    @classmethod
+    def kernels(cls) -> tuple[str, ...]:
+        return "spot", "spot_image"
+
+    @property
+    def sampled_by(self) -> str:
+        return "spot" if self.image is None else "spot_image"
+
+    @property
+    def shows(self) -> LightImage | None:
+        return self.image
+
+    def parameters(self) -> dict[str, Parameter]:
         """The slope of a falloff by angle is negative."""
+        projection = {} if self.image is None else _projection(self, self.image, tan(radians(self.outer_degrees)))
         scale, sign = (radians, -1) if self.falloff == "angle" else (one_minus_cos, 1)
         inner, outer = scale(self.inner_degrees), scale(self.outer_degrees)
         return {
@@ -164,11 +196,13 @@ class SpotLight(BaseLight):
             "outer": outer,
             "slope": sign / max(outer - inner, STEEPEST),
             "per_range2": _per_range2(self.range),
+            **projection,
         }
 
     def bounds(self) -> Bounds:
+        intensity = self.intensity if self.image is None else _typical(self.intensity, self.image)
         return Bounds(
-            self.position, self.intensity, axis=unit_vector(self.direction), height=one_minus_cos(self.outer_degrees)
+            self.position, intensity, axis=unit_vector(self.direction), height=one_minus_cos(self.outer_degrees)
         )
 
     def features(self) -> frozenset[str]:
@@ -181,6 +215,92 @@ class SpotLight(BaseLight):
             "smaller angle"
         )
         return super().conflicts() + ([] if self.inner_degrees < self.outer_degrees else [fault])
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProjectorLight(BaseLight):
+    """Point light that projects an image, white if there is none, along `direction`, with `up` as far up as possible.
+
+    fov_degrees: the image's vertical angle, as a camera's; its pixels are square. intensity: W/sr of white on the axis.
+    image_of: the image is proportional to the "irradiance" of a screen perpendicular to the axis, as of a projector of
+    slides; the radiant intensity is larger by the cube of 1/cos of the angle from the axis. Or it is proportional to
+    the radiant "intensity". `range`: as PointLight's.
+    """
+
+    kernel: ClassVar[str] = "projector"
+    position: Vector
+    direction: Vector
+    intensity: Radiance
+    image: LightImage | None = None
+    up: Vector = (0.0, 1.0, 0.0)
+    fov_degrees: Annotated[float, Gt(0), Lt(180)] = 40.0
+    image_of: Literal["irradiance", "intensity"] = "irradiance"
+    range: Length | None = None
+
+    @property
+    def shows(self) -> LightImage:
+        return self.image or WHITE_IMAGE
+
+    def parameters(self) -> dict[str, Parameter]:
+        return {
+            "position": self.position,
+            "axis": unit_vector(self.direction),
+            "intensity": self.intensity,
+            "of_irradiance": float(self.image_of == "irradiance"),
+            "per_range2": _per_range2(self.range),
+            **_projection(self, self.shows, self._tangent, self.shows.aspect),
+        }
+
+    def bounds(self) -> Bounds:
+        corner = degrees(atan(self._tangent * hypot(1, self.shows.aspect)))
+        axis = unit_vector(self.direction)
+        return Bounds(self.position, _typical(self.intensity, self.shows), axis=axis, height=one_minus_cos(corner))
+
+    def features(self) -> frozenset[str]:
+        return frozenset({"LIGHT_CONES", "LIGHT_RANGES"} if self.range else {"LIGHT_CONES"})
+
+    @property
+    def _tangent(self) -> float:
+        return tan(radians(self.fov_degrees) / 2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoniometricLight(BaseLight):
+    """Point light whose radiant intensity, `intensity` times the image, is measured in all directions.
+
+    image: equirectangular, as an environment map; white if there is none. direction: the center of the image, with `up`
+    towards its top. `range`: as PointLight's.
+    """
+
+    kernel: ClassVar[str] = "goniometric"
+    position: Vector
+    intensity: Radiance
+    image: LightImage | None = None
+    direction: Vector = (0.0, 0.0, 1.0)
+    up: Vector = (0.0, 1.0, 0.0)
+    range: Length | None = None
+
+    @property
+    def shows(self) -> LightImage:
+        return self.image or WHITE_IMAGE
+
+    def parameters(self) -> dict[str, Parameter]:
+        right, top = image_axes(self.direction, self.up)
+        return {
+            "position": self.position,
+            "axis": unit_vector(self.direction),
+            "intensity": self.intensity,
+            "per_range2": _per_range2(self.range),
+            "right": _vector(right),
+            "top": _vector(top),
+            "image": self.shows.with_wrap(("repeat", "clamp")),
+        }
+
+    def bounds(self) -> Bounds:
+        return Bounds(self.position, _typical(self.intensity, self.shows))
+
+    def features(self) -> frozenset[str]:
+        return frozenset({"LIGHT_RANGES"} if self.range else ())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,7 +332,7 @@ class DirectionalLight(BaseLight):
         red, green, blue = (value / solid_angle for value in self.irradiance)
         return red, green, blue
 
-    def parameters(self) -> dict[str, float | Vector]:
+    def parameters(self) -> dict[str, Parameter]:
         towards = unit_vector(self.direction, -1)
         if self.sampled_by == "directional":
             return {"towards": towards, "irradiance": self.irradiance}
@@ -230,7 +350,7 @@ class DirectionalLight(BaseLight):
 
 
 #: Every type of light.
-Light = PointLight | SpotLight | DirectionalLight
+Light = PointLight | SpotLight | ProjectorLight | GoniometricLight | DirectionalLight
 LIGHTS: tuple[type[Light], ...] = get_args(Light)
 
 
@@ -245,9 +365,44 @@ def unit_vector(direction: Vector, sign: float = 1) -> Vector:
     return x, y, z
 
 
+def image_axes(direction: Vector, up: Vector) -> tuple[Doubles, Doubles]:
+    """Return the unit vectors (3,) to the right and the top of an image that is seen along `direction`."""
+    forward = np.array(unit_vector(direction))
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    return right, np.cross(right, forward)
+
+
+def upright(direction: Vector, up: Vector) -> bool:
+    """Return whether `up` is a direction that is not parallel to another one."""
+    return any(up) and float(np.linalg.norm(np.cross(unit_vector(direction), unit_vector(up)))) > SLANT
+
+
 def one_minus_cos(degrees: float) -> float:
     """Return 1 − cos x as 2 sin² (x/2), which is accurate for small angles."""
     return float(2 * np.sin(np.radians(degrees) / 2) ** 2)
+
+
+def _projection(
+    light: SpotLight | ProjectorLight, image: LightImage, tangent: float, aspect: float = 1.0
+) -> dict[str, Parameter]:
+    """Return the parameters of an image seen along the axis (kernels/light/image.cl). tangent: of half its
+    vertical angle; aspect: width over height."""
+    right, top = image_axes(light.direction, light.up)
+    across, upwards = _vector(right / (tangent * aspect)), _vector(top / tangent)
+    return {"across": across, "upwards": upwards, "image": image.with_wrap(("clamp", "clamp"))}
+
+
+def _typical(intensity: Radiance, image: LightImage) -> Radiance:
+    """Return the typical intensity: for a mean over all directions the probabilities of lights proportional to the
+    root mean square of what they contribute have the least variance."""
+    red, green, blue = (image.typical * intensity).tolist()
+    return red, green, blue
+
+
+def _vector(row: Doubles) -> Vector:
+    x, y, z = row.tolist()
+    return x, y, z
 
 
 def _per_range2(reach: float | None) -> float:

@@ -18,9 +18,14 @@ import numpy as np
 from imgui_bundle import imgui
 
 from ..scene.fields.limits import Ge, Gt, Le, Lt
+from ..scene.light_images import LightImage
 from ..scene.materials.textures import Texture
 
 Value = TypeVar("Value")
+Pictured = TypeVar("Pictured", Texture, LightImage)
+
+#: Types of values with an image, which the window does not replace.
+IMAGES = (Texture, LightImage)
 
 #: Largest range for which a slider is used.
 WIDEST = 20000
@@ -69,8 +74,8 @@ def edit(label: str, hint: Any, value: Any, step: float) -> Any:
         if len(kinds) < len(parts):
             return _edit_optional(label, kinds[0], value, step)
         return edit(label, next((kind for kind in kinds if _is(kind, value)), kinds[0]), value, step)
-    if hint is Texture:
-        return _edit_texture(label, value, step)
+    if hint in IMAGES:
+        return _edit_image(label, value, step)
     if origin is Literal:
         return choose(label, parts, value)
     if origin is tuple:
@@ -91,7 +96,7 @@ def _edit_optional(label: str, kind: Any, value: Any, step: float) -> Any:
     """Show a widget for a value that may be None: one more choice, or a checkbox."""
     if get_origin(kind) is Literal:
         return choose(label, (None, *get_args(kind)), value)
-    if kind is Texture and value is None:
+    if kind in IMAGES and value is None:
         imgui.text_disabled(f"{label}: none")
         return None
     changed, given = imgui.checkbox(f"##{label} given", value is not None)
@@ -104,11 +109,13 @@ def _edit_optional(label: str, kind: Any, value: Any, step: float) -> Any:
     return edit(label, kind, value, step)
 
 
-def _edit_texture(label: str, texture: Texture, step: float) -> Texture:
-    if imgui.tree_node_ex(f"{label}: {texture.picture.name}###{label}"):
-        texture = edit_fields(texture, step, without={"picture"})
+def _edit_image(label: str, image: Pictured, step: float) -> Pictured:
+    """Show widgets for the mapping of a texture or a light's image."""
+    name = image.picture.name if isinstance(image, Texture) else image.name
+    if imgui.tree_node_ex(f"{label}: {name}###{label}"):
+        image = edit_fields(image, step, without={"picture", "pixels", "name"})
         imgui.tree_pop()
-    return texture
+    return image
 
 
 def _edit_tuple(label: str, kinds: tuple[Any, ...], value: tuple[Any, ...], step: float) -> tuple[Any, ...]:
@@ -175,9 +182,11 @@ _PLAIN: dict[Any, Any] = {bool: imgui.checkbox, str: imgui.input_text}
 
 
 def _initial(hint: Any) -> Any:
-    """Return the initial value of an optional field that becomes enabled: 1, or the nearest allowed."""
+    """Return the initial value of an optional field that becomes enabled: 1, the nearest allowed, or the first word."""
     if get_origin(hint) is tuple:
         return tuple(map(_initial, get_args(hint)))
+    if get_origin(hint) is Literal:
+        return get_args(hint)[0]
     return _shortest((limits_of(hint) or NumberLimits()).clamp(1), hint)
 
 

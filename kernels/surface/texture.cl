@@ -3,10 +3,7 @@
 //
 // Coordinates as in glTF: (0, 0) is the upper left corner of the image. Colours are decoded from sRGB by a table before
 // they are filtered; numbers are linear.
-#include "core/vector.cl"
-
-#define REPEAT 0
-#define MIRROR 1
+#include "core/bilinear.cl"
 
 // Texture coordinates of a surface point, for each set.
 typedef struct { real2 set[UV_SETS]; } Coordinates;
@@ -42,20 +39,6 @@ typedef struct {
     real weight[4];
 } Footprint;
 
-static inline real on_picture(real u, ireal wrap) {
-    real turns = floor(u), pair = u - 2.0f * floor(0.5f * u);
-    real mirrored = pair > 1.0f ? 2.0f - pair : pair;
-    real clamped = u > 0.0f ? (u < 1.0f ? u : ONE) : ZERO;
-    return wrap == REPEAT ? u - turns : wrap == MIRROR ? mirrored : clamped;
-}
-
-// Wrap or clamp a column or row by at most one image size; the result is always inside, whatever the coordinates were.
-static inline ireal inside(ireal x, ireal size, ireal repeats) {
-    ireal around = x < 0 ? x + size : (x >= size ? x - size : x);
-    x = repeats ? around : x;
-    return x < 0 ? (ireal)(0) : (x >= size ? size - 1 : x);
-}
-
 static inline Footprint footprint(const Scene *scene, ireal texture, const Coordinates *at) {
     real u = at->set[0].x, v = at->set[0].y;
 #if UV_SETS > 1
@@ -66,22 +49,13 @@ static inline Footprint footprint(const Scene *scene, ireal texture, const Coord
     real3 u_row = GATHER3(scene->textures, texture, .u_row), v_row = GATHER3(scene->textures, texture, .v_row);
     ireal wrap_u = GATHER(ireal, scene->textures, texture, .wrap_u), wrap_v = GATHER(ireal, scene->textures, texture, .wrap_v);
     ireal width = GATHER(ireal, scene->textures, texture, .width), height = GATHER(ireal, scene->textures, texture, .height);
-    real x = on_picture(u_row.x * u + u_row.y * v + u_row.z, wrap_u) * TO_REAL(width) - 0.5f;
-    real y = on_picture(v_row.x * u + v_row.y * v + v_row.z, wrap_v) * TO_REAL(height) - 0.5f;
-    real left = floor(x), top = floor(y);
-    ireal nearest = GATHER(ireal, scene->textures, texture, .nearest) != 0;
-    real right_share = x - left, lower_share = y - top;
-    right_share = nearest ? (right_share < 0.5f ? ZERO : ONE) : right_share;
-    lower_share = nearest ? (lower_share < 0.5f ? ZERO : ONE) : lower_share;
-    ireal column[2], row[2], first = GATHER(ireal, scene->textures, texture, .first);
-    for (int i = 0; i < 2; ++i) {
-        column[i] = inside(TO_INT(left) + i, width, wrap_u == REPEAT);
-        row[i] = inside(TO_INT(top) + i, height, wrap_v == REPEAT);
-    }
+    Bilinear around = bilinear(u_row.x * u + u_row.y * v + u_row.z, v_row.x * u + v_row.y * v + v_row.z, width, height,
+                               wrap_u, wrap_v, GATHER(ireal, scene->textures, texture, .nearest) != 0);
+    ireal first = GATHER(ireal, scene->textures, texture, .first);
     Footprint found;
     for (int i = 0; i < 4; ++i) {
-        found.texel[i] = GATHER(ureal, scene->texels, first + row[i >> 1] * width + column[i & 1], .rgba);
-        found.weight[i] = (i & 1 ? right_share : 1.0f - right_share) * (i >> 1 ? lower_share : 1.0f - lower_share);
+        found.texel[i] = GATHER(ureal, scene->texels, first + around.texel[i], .rgba);
+        found.weight[i] = around.weight[i];
     }
     return found;
 }

@@ -23,6 +23,11 @@ lamp = { type = "diffuse", emission = [3, 2, 1] }
 type = "point"
 position = [0, 2, 0]
 intensity = [1, 2, 3]
+[[light]]
+type = "goniometric"
+position = [0, 3, 0]
+intensity = [1, 1, 1]
+image = "t.pgm"
 [[sphere]]
 name = "plain"
 [[sphere]]
@@ -41,6 +46,7 @@ material = "shell"
         '"lamp": diffuse, emission',
         '"plain": diffuse',
         "point: position 0 2 0, intensity 1 2 3",
+        "goniometric: position 0 3 0, intensity 1 1 1, image t.pgm (1x1), direction 0 0 1, up 0 1 0",
         "environment: color 1 1 1, strength 0.5",
         'sphere "bulb": radiance 3 2 1',
     ]
@@ -51,7 +57,7 @@ material = "shell"
         "set": ["clearcoat"],
         "textured": ["color"],
     }
-    assert found["light_list"][2] == {"type": "sphere", "name": "bulb", "radiance": [3, 2, 1]}
+    assert found["light_list"][3] == {"type": "sphere", "name": "bulb", "radiance": [3, 2, 1]}
 
 
 def test_info_lists_a_sky_by_where_its_sun_is(tmp_path: Path) -> None:

@@ -261,12 +261,12 @@ def test_what_clrt_lacks_is_refused_or_replaced(
 
 
 def test_other_parts_that_clrt_lacks(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
-    text = """<shape type="sdfgrid"/><emitter type="projector"/><integrator type="depth"/>
+    text = """<shape type="sdfgrid"/><emitter type="collimated"/><integrator type="depth"/>
         <shape type="sphere"><bsdf type="hair"><float name="melanin" value="1"/></bsdf></shape>
         <sensor type="perspective"><transform name="to_world"><scale x="-1"/></transform>
         <film type="hdrfilm"><rfilter type="lanczos"/></film></sensor>"""
     said = problem(folder, text)
-    assert all(word in said for word in ("sdfgrid", "projector", "depth", "hair", "mirrors", "lanczos")), said
+    assert all(word in said for word in ("sdfgrid", "collimated", "depth", "hair", "mirrors", "lanczos")), said
     read = load(folder / "scene.xml", approximate=True)
     assert (len(read.spheres), len(read.lights), read.render.integrator) == (1, 0, "path")
     assert isinstance(read.spheres[0].material, Diffuse)

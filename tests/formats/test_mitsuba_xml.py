@@ -142,11 +142,11 @@ def test_mistakes_are_named(folder: Path, text: str, words: list[str]) -> None:
 
 
 def test_all_that_is_unsupported_is_listed(folder: Path) -> None:
-    (folder / "scene.xml").write_text("""<scene version="3.0.0"><shape type="torus"/><emitter type="projector"/>
+    (folder / "scene.xml").write_text("""<scene version="3.0.0"><shape type="torus"/><emitter type="collimated"/>
         <shape type="sphere"><bsdf type="hair"/></shape><integrator type="depth"/></scene>""")
     with pytest.raises(UnsupportedError) as error:
         read_mitsuba(folder / "scene.xml")
-    assert error.value.features == ["shape torus", "bsdf hair", "emitter projector", "integrator depth"]
+    assert error.value.features == ["shape torus", "bsdf hair", "emitter collimated", "integrator depth"]
     read = read_mitsuba_of(folder, '<shape type="sphere"><bsdf type="hair"/></shape><shape type="sphere"/>')
     assert read.missing == {"shape[0]": ["bsdf hair"]} and len(read.scene.spheres) == 2
 

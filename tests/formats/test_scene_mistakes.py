@@ -209,7 +209,7 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
         ('[[sphere]]\nmaterial = "gold"', 'sphere[0].material: "gold" is unknown; none is defined'),
         (
             "[[light]]\ntype = { point = 1 }",
-            "light[0].type: { point = 1 } is unknown; write one of directional, point, ",
+            "light[0].type: { point = 1 } is unknown; write one of directional, goniometric, point, ",
         ),
         (
             '[[light]]\ntype = "spot"\nposition = [0, 0, 0]\ndirection = [0, 0, 0]\nintensity = [1, 1, 1]',

@@ -8,6 +8,7 @@ from typing import Any, TypeVar, get_args
 
 import numpy as np
 
+from clrt.scene.light_images import LightImage
 from clrt.scene.materials.material import Material
 from clrt.scene.materials.material_types import (
     BlinnPhong,
@@ -72,6 +73,19 @@ class Draws:
             offset=(self.between(-1, 1), self.between(-1, 1)),
             scale=(self.between(-2, 2), self.between(0.5, 2)),
             rotation_degrees=self.between(-180, 180),
+            filter=self.one_of(("linear", "nearest")),
+        )
+
+    def light_image(self) -> LightImage | None:
+        """Return the image of a light, which some have not."""
+        if self.chance(0.3):
+            return None
+        return LightImage(
+            pixels=self._numbers.uniform(0.2, 1, (TEXELS, TEXELS + 1, 3)).astype(np.float32),
+            offset=(self.between(-1, 1), self.between(-1, 1)),
+            scale=(self.between(-2, 2), self.between(0.5, 2)),
+            rotation_degrees=self.between(-180, 180),
+            wrap=self.one_of((None, ("repeat", "mirror"), ("mirror", "clamp"))),
             filter=self.one_of(("linear", "nearest")),
         )
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
+from clrt.scene.lights import DirectionalLight, GoniometricLight, PointLight, ProjectorLight, SpotLight
 from clrt.scene.model import Environment, Scene
 
+from .light_images import image_factor
 from .textures import bilinear
 from .vectors import Doubles, dot, unit
 
-Known = PointLight | SpotLight | DirectionalLight
+Placed = PointLight | SpotLight | ProjectorLight | GoniometricLight
+Known = Placed | DirectionalLight
 #: Directional lights below this angular diameter in degrees are delta lights.
 POINT = 1e-4
 
@@ -30,7 +32,7 @@ def delta_lights(scene: Scene) -> list[Known]:
     """Return the lights that only direct summation finds. Raises TypeError for types without a formula here."""
     known: list[Known] = [light for light in scene.lights if isinstance(light, Known)]
     if len(known) < len(scene.lights):
-        raise TypeError("the oracle knows only point, spot and directional lights")
+        raise TypeError("the oracle does not know a light's type")
     return [light for light in known if not isinstance(light, DirectionalLight) or light.angle_degrees < POINT]
 
 
@@ -42,18 +44,25 @@ def arriving(light: Known, p: Doubles) -> tuple[Doubles, Doubles, Doubles]:
     away = np.array(light.position, float) - p
     distance = np.linalg.norm(away, axis=1)
     towards = away / distance[:, None]
-    strength = _falloff(light, towards) / distance**2
+    strength = 1 / distance**2
     if light.range is not None:
         strength = strength * np.maximum(1 - (distance / light.range) ** 4, 0)
-    intensity: Doubles = np.array(light.intensity, float)
-    return towards, distance, strength[:, None] * intensity
+    return towards, distance, strength[:, None] * _intensity(light, towards)
 
 
-def _falloff(light: PointLight | SpotLight, towards: Doubles) -> Doubles:
+def _intensity(light: Placed, towards: Doubles) -> Doubles:
+    """Return the radiant intensity (n, 3) against unit directions to the light."""
+    intensity: Doubles = np.tile(np.array(light.intensity, float), (len(towards), 1))
+    if isinstance(light, SpotLight):
+        intensity = intensity * _falloff(light, towards)[:, None]
+    if isinstance(light, PointLight) or (isinstance(light, SpotLight) and light.image is None):
+        return intensity
+    return intensity * image_factor(light, -towards)
+
+
+def _falloff(light: SpotLight, towards: Doubles) -> Doubles:
     """Return KHR_lights_punctual's falloff, the square of a ramp linear in the cosine from the inner to the outer cone;
     or one linear in the angle."""
-    if isinstance(light, PointLight):
-        return np.ones(len(towards))
     inner, outer = np.cos(np.radians([light.inner_degrees, light.outer_degrees]))
     cosine = -dot(towards, unit(np.array(light.direction, float)))
     if light.falloff == "angle":

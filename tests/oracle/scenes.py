@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from datetime import date
 from math import cos, pi, sin
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from clrt.scene.cameras import Projection
 from clrt.scene.geometry.transform import rotation, scaling, transform_mesh, translation
-from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
+from clrt.scene.lights import DirectionalLight, GoniometricLight, Light, PointLight, ProjectorLight, SpotLight
 from clrt.scene.materials.material_types import Diffuse, Material
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere, Vector
 
@@ -30,7 +30,7 @@ SIZE = (12, 8)
 SHAPES = ("sphere", "solid", "sheet", "instances")
 EMITTERS = ("sphere", "solid", "sheet", "instances")
 #: Lights that the oracle finds by chance, then those that it sums.
-LIGHTS = (*EMITTERS, "disc", "point", "spot", "directional")
+LIGHTS = (*EMITTERS, "disc", "point", "spot", "projector", "goniometric", "directional")
 SKIES = (None, "constant", "image")
 #: Positions around the middle of the floor.
 PLACES = ((-1.0, 0.0), (0.9, 0.4), (-0.1, -1.1), (0.1, 1.2))
@@ -54,7 +54,7 @@ class _Stage:
     meshes: list[Mesh] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
     spheres: list[Sphere] = field(default_factory=list)
-    lights: list[DirectionalLight | PointLight | SpotLight] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
 
     def scene(self, name: str) -> Scene:
         draws = self.draws
@@ -112,13 +112,26 @@ class _Stage:
             if kind == "point":
                 self.lights.append(PointLight(position=(x, y, z), intensity=intensity, range=reach))
                 return
+            up = draws.between(-0.5, 0.5), 1.0, draws.between(-0.5, 0.5)
+            given: Any = dict(
+                position=(x, y, z),
+                direction=direction,
+                intensity=intensity,
+                range=reach,
+                up=up,
+                image=draws.light_image(),
+            )
+            if kind == "projector":
+                given |= {"image_of": draws.one_of(("irradiance", "intensity")), "fov_degrees": draws.between(30, 80)}
+                self.lights.append(ProjectorLight(**given))
+                return
+            if kind == "goniometric":
+                self.lights.append(GoniometricLight(**given))
+                return
             outer = draws.between(20, 60)
             self.lights.append(
                 SpotLight(
-                    position=(x, y, z),
-                    direction=direction,
-                    intensity=intensity,
-                    range=reach,
+                    **given,
                     inner_degrees=draws.between(0.0, 0.9) * outer,
                     outer_degrees=outer,
                     falloff=draws.one_of(("cosine", "angle")),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from clrt.scene.light_images import LightImage
 from clrt.scene.materials.textures import Texture
 
 from .vectors import Doubles, Whole
@@ -13,14 +14,14 @@ CHANNELS = ("red", "green", "blue", "alpha")
 
 def color_at(texture: Texture, uv: Doubles) -> Doubles:
     """Return linear colours times the factor (n, 3) at texture coordinates (n, 2)."""
-    return _looked_up(texture, _linear(texture.picture.texels[..., :3] / 255.0), uv) * texture.factor
+    return looked_up(texture, texture.wrap, _linear(texture.picture.texels[..., :3] / 255.0), uv) * texture.factor
 
 
 def number_at(texture: Texture, uv: Doubles) -> Doubles:
     """Return values of its channel times the factor, (n,)."""
     values = texture.picture.texels[..., CHANNELS.index(texture.channel)] / 255.0
     factor: Doubles = np.asarray(texture.factor, float)
-    return _looked_up(texture, values[..., None], uv)[:, 0] * factor
+    return looked_up(texture, texture.wrap, values[..., None], uv)[:, 0] * factor
 
 
 def bilinear(grid: Doubles, x: Doubles, y: Doubles, wrap_x: str, wrap_y: str) -> Doubles:
@@ -34,14 +35,15 @@ def bilinear(grid: Doubles, x: Doubles, y: Doubles, wrap_x: str, wrap_y: str) ->
     return np.asarray(above * (1 - lower_part) + below * lower_part)
 
 
-def _looked_up(texture: Texture, grid: Doubles, uv: Doubles) -> Doubles:
+def looked_up(texture: Texture | LightImage, wraps: tuple[str, str], grid: Doubles, uv: Doubles) -> Doubles:
+    """Return the values (n, c) of a grid (h, w, c) at coordinates (n, 2) that are mapped to it."""
     height, width = grid.shape[:2]
     angle = np.radians(texture.rotation_degrees)
     scaled = uv * texture.scale
     # KHR_texture_transform: scaled, rotated counter-clockwise in a frame whose v points down, translated.
     u = np.cos(angle) * scaled[:, 0] + np.sin(angle) * scaled[:, 1] + texture.offset[0]
     v = -np.sin(angle) * scaled[:, 0] + np.cos(angle) * scaled[:, 1] + texture.offset[1]
-    wrap_u, wrap_v = texture.wrap
+    wrap_u, wrap_v = wraps
     if texture.filter == "nearest":
         row = _wrapped(np.floor(v * height).astype(int), height, wrap_v)
         return np.asarray(grid[row, _wrapped(np.floor(u * width).astype(int), width, wrap_u)])

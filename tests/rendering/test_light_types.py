@@ -91,7 +91,7 @@ def test_a_type_is_what_it_says(kind: type[Light]) -> None:
         assert light.sampled_by in kind.kernels() and not light.is_black
         assert names.setdefault(light.sampled_by, set(light.parameters())) == set(light.parameters())
         assert isinstance(light.bounds(), DistantBounds if kind.distant else Bounds)
-    known = {"position", "direction", "falloff", *STRENGTHS, *LENGTHS}
+    known = {"position", "direction", "up", "image", "image_of", "falloff", *STRENGTHS, *LENGTHS}
     assert all(field.name in known or field.name.endswith("_degrees") for field in fields(kind))
     assert {field.name for field in fields(kind)} & set(STRENGTHS)
 

@@ -20,7 +20,8 @@ from clrt.rendering.accumulation import launch_plan
 from clrt.rendering.compile import pack_scene as pack_module
 from clrt.rendering.compile.choices import LANES, OFFSETS, Choices
 from clrt.rendering.compile.compile_scene import compile_scene
-from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
+from clrt.scene.light_images import LightImage
+from clrt.scene.lights import DirectionalLight, GoniometricLight, PointLight, ProjectorLight, SpotLight
 from clrt.scene.materials.material_types import MATERIALS, Dielectric, Diffuse, MetallicRoughness, Mirror
 from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
@@ -43,6 +44,7 @@ def everything() -> Scene:
     lamp = quad([(-1, 4, -1), (1, 4, -1), (1, 4, 1), (-1, 4, 1)], Diffuse(emission=(6.0, 5.0, 4.0)))
     floor = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(0.7, 0.6, 0.5)))
     sky = (2 * np.random.default_rng(0).random((8, 16, 1)) ** 6 * [1.0, 0.8, 0.6]).astype(np.float32)
+    slide = LightImage(pixels=np.random.default_rng(1).random((3, 4, 3)).astype(np.float32))
     return Scene(
         meshes=[floor, lamp, ball],
         spheres=[
@@ -56,6 +58,11 @@ def everything() -> Scene:
             DirectionalLight(direction=(1.0, -2.0, -1.0), irradiance=(0.5, 0.4, 0.3)),
             DirectionalLight(direction=(-1.0, -2.0, -1.0), irradiance=(0.2, 0.3, 0.4), angle_degrees=20.0),
             SpotLight(position=(-3.0, 3.0, 2.0), direction=(1.0, -1.0, -0.5), intensity=(9.0, 9.0, 5.0)),
+            SpotLight(position=(3.0, 3.0, -2.0), direction=(-1.0, -1.0, 0.5), intensity=(9.0, 9.0, 5.0), image=slide),
+            ProjectorLight(
+                position=(-2.0, 3.0, -2.0), direction=(1.0, -1.0, 1.0), intensity=(5.0, 9.0, 5.0), image=slide
+            ),
+            GoniometricLight(position=(0.5, 3.0, 2.0), intensity=(1.0, 2.0, 1.0), image=slide),
         ],
         environment=Environment(image=sky, rotation_degrees=30.0),
         camera=Camera(position=(0.0, 2.0, 6.0), look_at=(0.0, 1.0, 0.0)),

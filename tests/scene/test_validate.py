@@ -113,7 +113,10 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "light nan": (set_scene(lights=[light((0, NAN, 0))]), "light[0].direction[1]: nan is not a finite number"),
     "light text": (set_scene(lights=[light("up")]), 'light[0].direction: "up" is not a list; write the numbers'),
     "light short": (set_scene(lights=[light((0,))]), "light[0].direction: [0] has 1 entries; write 3"),
-    "no light": (set_scene(lights=[Sphere()]), "is not a light; write a PointLight or SpotLight or DirectionalLight"),
+    "no light": (
+        set_scene(lights=[Sphere()]),
+        "is not a light; write a PointLight or SpotLight or",
+    ),
     "look_at": (set_scene(camera=Camera(position=(1, 2, 3), look_at=(1, 2, 3))), "camera.look_at: [1, 2, 3] is the"),
     "up": (set_scene(camera=Camera(up=(0, 0, 2e-9))), "camera.up: [0, 0, 2e-09] is parallel to the view"),
     "no up": (set_scene(camera=Camera(up=(0, 0, 0))), "camera.up: [0, 0, 0] is not a direction"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 from imgui_bundle import imgui
 
 from clrt.output.view_transform import to_display
+from clrt.scene.light_images import LightImage
+from clrt.scene.lights import ProjectorLight
 
 from .driver import Driver, at, changed, drive, halves
 from .scenes import SKY, two_balls
@@ -72,3 +75,31 @@ def test_the_light_moves(tmp_path: Path) -> None:
         assert at(window.picture(), 80, 5) == pytest.approx(expected.tolist(), abs=1)
 
     drive(two_balls(), test, tmp_path)
+
+
+@pytest.mark.programs
+def test_the_image_of_a_light_is_placed(tmp_path: Path) -> None:
+    """Its mapping can be edited, and it can be left out; its pixels are those of the file."""
+    image = LightImage(pixels=np.ones((2, 2, 3), np.float32), name="slide")
+    light = ProjectorLight(position=(0, 5, 3), direction=(0, -1, -0.5), intensity=(9, 9, 9), image=image)
+
+    def test(window: Driver) -> None:
+        def shown() -> LightImage | None:
+            (edited,) = window.live.scene.lights
+            assert isinstance(edited, ProjectorLight)
+            return edited.image
+
+        window.rest()
+        window.panel("Lights")
+        window.context.item_open("light/image")
+        window.context.item_input_value("light/image/scale/$$0", -1)
+        window.choose("light/image/filter", "nearest")
+        window.context.item_click("light/image/##wrap given")
+        window.context.yield_(2)
+        assert shown() == replace(image, scale=(-1, 1), filter="nearest", wrap=("repeat", "repeat"))
+        window.context.item_click("light/##image given")
+        window.context.yield_(2)
+        assert shown() is None
+        window.rest()
+
+    drive(replace(two_balls(), lights=[light]), test, tmp_path)

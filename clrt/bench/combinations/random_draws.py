@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import numpy as np
 
 from ...scene.fields.limits import Ge, Gt, Le, Limit, Lt
+from ...scene.light_images import LightImage
 from ...scene.materials.material import Material
 from ...scene.materials.textures import Picture, Texture
 from ..numerics.bsdf_cases import NUMBERS
@@ -98,6 +99,8 @@ class Draws:
             return None
         if plain is None:
             return self._map()
+        if plain is LightImage:
+            return self._light_image()
         if Texture in parts and self.chance(TEXTURED):
             return self.texture(self._plain(plain, field.name))
         return self._plain(plain, field.name)
@@ -112,6 +115,12 @@ class Draws:
         texels = self.texels((TEXELS, TEXELS, 4), 90, 166)
         texels[..., 2:] = 255
         return self.record(Texture, picture=Picture(texels), factor=self.between(0.2, 1.0))
+
+    def _light_image(self) -> LightImage:
+        """Return an image with random pixels and settings."""
+        low = DIM if self.moderate else 0
+        pixels = self.texels((TEXELS, TEXELS, 3), low).astype(np.float32) / np.float32(128)
+        return self.record(LightImage, pixels=pixels, name="image")
 
     def _plain(self, hint: Any, name: str) -> Any:
         origin, parts = get_origin(hint), get_args(hint)

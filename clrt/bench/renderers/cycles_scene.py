@@ -17,7 +17,7 @@ from ...errors import UsageError
 from ...output.images import write_image
 from ...rendering.compile.features import biased_by
 from ...scene.geometry.instancing import unfolded
-from ...scene.lights import DirectionalLight, PointLight, SpotLight
+from ...scene.lights import DirectionalLight, GoniometricLight, PointLight, ProjectorLight, SpotLight
 from ...scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ...scene.materials.textures import untextured
 from ...scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
@@ -202,6 +202,8 @@ def exported_lights(scene: Scene) -> list[Exported]:
                 raise UsageError(
                     f"{scene.name}: ranges and spot lights fall off differently in Cycles and are not exported"
                 )
+            case ProjectorLight() | GoniometricLight():
+                raise UsageError(f"{scene.name}: images of point lights are not exported to Cycles")
             case _:
                 assert_never(light)
     return found

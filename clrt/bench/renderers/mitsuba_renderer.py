@@ -53,7 +53,7 @@ class Mitsuba:
 
     @cached_property
     def _scene(self) -> Any:
-        return self._library.load_dict(_native(self._library, self._plugins))
+        return self._library.load_dict(native(self._library, self._plugins))
 
 
 def newest_llvm(root: Path = Path("/")) -> tuple[int, Path | None]:
@@ -81,13 +81,13 @@ def load(variant: str | None = None) -> tuple[Any, str]:
     return library, f"mitsuba {variant.split('_')[0]}"
 
 
-def _native(library: Any, value: Any) -> Any:
+def native(library: Any, value: Any) -> Any:
     """Convert the values of `mitsuba_scene` to Mitsuba's objects."""
     match value:
         case {"type": "mesh"}:
-            return _mesh(library, **{name: _native(library, entry) for name, entry in value.items() if name != "type"})
+            return _mesh(library, **{name: native(library, entry) for name, entry in value.items() if name != "type"})
         case dict():
-            return {name: _native(library, entry) for name, entry in value.items()}
+            return {name: native(library, entry) for name, entry in value.items()}
         case np.ndarray() if value.shape == (4, 4):
             return library.ScalarTransform4f(value)
         case np.ndarray() if value.ndim == 3:

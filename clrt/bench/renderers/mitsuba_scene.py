@@ -7,7 +7,7 @@ Materials are converted in mitsuba_bsdfs.py.
 
 from __future__ import annotations
 
-from math import cos, radians, tan
+from math import cos, pi, radians, tan
 from typing import Any, assert_never
 
 import numpy as np
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from ...errors import UsageError
 from ...rendering.compile.features import biased_by
 from ...scene.geometry.instancing import unfolded
-from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
+from ...scene.light_images import LightImage
+from ...scene.lights import DirectionalLight, GoniometricLight, Light, PointLight, ProjectorLight, SpotLight
 from ...scene.materials.material_types import Dielectric
 from ...scene.materials.textures import Texture
 from ...scene.model import Camera, Environment, Mesh, Scene, Sphere
@@ -149,13 +150,17 @@ def _distance(camera: Camera) -> float:
 
 
 def _light(light: Light, camera: Camera) -> Plugin:
-    if isinstance(light, PointLight | SpotLight) and light.range is not None:
+    if not isinstance(light, DirectionalLight) and light.range is not None:
         raise UsageError("light: ranges are not exported to Mitsuba")
     match light:
         case PointLight():
             return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
         case SpotLight():
             return _spot(light)
+        case ProjectorLight():
+            return _projector(light)
+        case GoniometricLight():
+            raise UsageError("goniometric: Mitsuba has no such light")
         case DirectionalLight() if light.angle_degrees:
             return _sun(light, camera)
         case DirectionalLight():
@@ -191,6 +196,11 @@ def _spot(light: SpotLight) -> Plugin:
     """Return a spot light. Mitsuba's falloff is linear in the angle; glTF's is represented by a projected texture."""
     frame = _frame(light.position, light.direction, _up_for(light.direction))
     plugin = {"type": "spot", "to_world": frame, "intensity": rgb(light.intensity), "cutoff_angle": light.outer_degrees}
+    if light.image is not None:
+        if light.falloff != "angle":
+            raise UsageError('spot: a spot with an image is exported to Mitsuba only with falloff = "angle"')
+        frame = _frame(light.position, light.direction, tuple(-part for part in light.up))  # the image is upside down
+        plugin |= {"to_world": frame, "texture": _image(light.image, (1.0, 1.0, 1.0))}
     if light.falloff == "angle":
         return plugin | {"beam_width": light.inner_degrees}
     if light.outer_degrees > SPOT_DEGREES:
@@ -207,6 +217,38 @@ def _spot(light: SpotLight) -> Plugin:
             "raw": True,
             "wrap_mode": "clamp",
         },
+    }
+
+
+def _projector(light: ProjectorLight) -> Plugin:
+    if light.image_of != "irradiance":
+        raise UsageError('projector: Mitsuba has only image_of = "irradiance"')
+    return {
+        "type": "projector",
+        "to_world": _frame(light.position, light.direction, light.up),
+        "fov": light.fov_degrees,
+        "fov_axis": "y",
+        "scale": 1 / pi,
+        "irradiance": _image(light.shows, light.intensity),
+    }
+
+
+def _image(image: LightImage, factor: tuple[float, float, float]) -> Plugin:
+    """Return a light's image times a color."""
+    wrap = image.wrap or ("clamp", "clamp")
+    if wrap[0] != wrap[1]:
+        raise UsageError("light: Mitsuba's images have one wrap mode")
+    if 1 in image.pixels.shape[:2] and image.aspect != 1:
+        raise UsageError("light: Mitsuba's images have at least 2x2 pixels")
+    to_picture = np.eye(4)
+    to_picture[:2][:, [0, 1, 3]] = image.to_picture
+    return {
+        "type": "bitmap",
+        "bitmap": image.pixels * np.array(factor, np.float32),
+        "raw": True,
+        "to_uv": to_picture,
+        "wrap_mode": wrap[0],
+        "filter_type": "bilinear" if image.filter == "linear" else "nearest",
     }
 
 

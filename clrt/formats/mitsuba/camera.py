@@ -45,13 +45,13 @@ def camera_of(plugin: Plugin, size: tuple[int, int], notes: Notes) -> Camera:
     return replace(
         camera,
         lens_shift=(across, -down),
-        fov_degrees=_vertical_fov(plugin, aspect),
+        fov_degrees=vertical_fov(plugin, aspect),
         aperture_radius=radius,
         focus_distance=distance if radius else None,
     )
 
 
-def _vertical_fov(plugin: Plugin, aspect: float) -> float:
+def vertical_fov(plugin: Plugin, aspect: float) -> float:
     """Return the vertical angle in degrees, from `fov` along `fov_axis`, or from `focal_length` on 36 x 24 mm film."""
     axis = plugin.value("fov_axis", str, "x").lower()
     if "fov" in plugin.values:

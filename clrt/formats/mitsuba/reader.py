@@ -92,7 +92,7 @@ class _Reader:
         self._notes = notes
         self._problems: list[str] = []
         self._features: list[str] = []
-        textures = TextureReader(notes)
+        self._textures = textures = TextureReader(notes)
         materials = MaterialReader(textures, notes, TYPES, unknown)
         self._shapes = ShapeReader(textures, materials, notes, stand_in)
 
@@ -140,7 +140,7 @@ class _Reader:
                 sky = above or sky
                 lights = [*suns, *lights]  # first, as in a scene file with the sky's parameters
             else:
-                lights.append(self._tried(lambda each: light(each, self._notes), plugin))
+                lights.append(self._tried(lambda each: light(each, self._textures, self._notes), plugin))
         return [each for each in lights if each], sky
 
     def _parts(self, plugin: Plugin) -> list[Mesh | Sphere | Instance]:

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import replace
 from math import atan2, degrees, hypot
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from ...errors import SceneError
+from ...scene.light_images import LightImage
 from ...scene.materials.textures import Picture, Texture, Wrap
+from ..images.image_reader import read_picture, srgb_from_linear
 from ..scene_parts.notes import Notes
-from ..scene_parts.texture_images import LUMINANCE, Curve, TextureImages, checks
+from ..scene_parts.texture_images import FLOATS, LUMINANCE, Curve, TextureImages, checks
 from .bumps import Bump, Sizes, finer, normal_map
 from .values import Doubles, rgb
 from .xml import Plugin
@@ -25,6 +28,8 @@ FILTERS: dict[str, Literal["linear", "nearest"]] = {
     "trilinear": "linear",
     "ewa": "linear",
 }
+#: Parameters that affect only how Mitsuba stores the texels.
+STORED = {"format", "accel", "max_anisotropy", "cache"}
 #: Gamma of Mitsuba 0.x that is taken for sRGB, as is −1.
 SRGB = 2.2
 #: Tolerance for the columns of a texture's transform to be orthogonal, as the cosine of their angle.
@@ -118,17 +123,35 @@ class TextureReader:
         raw = self._is_raw(plugin)
         if use == "normal" and not raw:
             plugin.refuse("is not raw", "write raw = true, for a normal", "bitmap, raw = false, for a normal")
-        plugin.used |= {"format", "accel", "max_anisotropy", "cache"}  # affect only how Mitsuba stores the texels
-        path = plugin.value("filename", str, "")
-        place = _placed(plugin, plugin.transform("to_uv"))
-        both = plugin.value("wrap_mode", str, "repeat")
-        wraps = [WRAPS.get(plugin.value(f"wrap_mode_{axis}", str, both)) for axis in "uv"]
-        kind = FILTERS.get(plugin.value("filter_type", str, "bilinear"))
-        if wraps[0] is None or wraps[1] is None or kind is None:
-            plugin.refuse("its wrap_mode or filter_type is unknown", f"write {', '.join(WRAPS)}; {', '.join(FILTERS)}")
+        plugin.used |= STORED
+        mapping = _mapping(plugin)
         curve: Curve = "" if use == "normal" else "" if raw == (use == "number") else "encode" if raw else "decode"
-        picture = self._images.picture(path, curve, grey=use == "number")
-        return Texture(picture=picture, wrap=(wraps[0], wraps[1]), filter=kind, **place)
+        picture = self._images.picture(plugin.value("filename", str, ""), curve, grey=use == "number")
+        return Texture(picture=picture, **mapping)
+
+    def light_image(self, owner: Plugin, name: str) -> LightImage | None:
+        """Read the texture of a light; None if it has none."""
+        plugin = owner.child(name)
+        if plugin is None:
+            return None
+        if plugin.kind == "checkerboard":
+            pair = [
+                rgb(plugin.color(color, value), emitted=True) for color, value in (("color0", 0.4), ("color1", 0.2))
+            ]
+            pixels = np.array([pair, pair[::-1]], np.float32)
+            mapping = {"filter": "nearest", "wrap": ("repeat", "repeat"), **_placed(plugin, plugin.transform("to_uv"))}
+            return LightImage(pixels=pixels, name="checkerboard", **mapping)
+        if plugin.kind != "bitmap":
+            plugin.refuse_kind("bitmap or checkerboard")
+        plugin.used |= STORED
+        path = Path(plugin.value("filename", str, ""))
+        pixels = read_picture(path)
+        if self._is_raw(plugin) and path.suffix.lower() not in FLOATS:
+            pixels = srgb_from_linear(pixels)
+        for axis in (0, 1):
+            if pixels.shape[axis] == 1:  # Mitsuba doubles such images, which affects a projector's aspect ratio
+                pixels = np.repeat(pixels, 2, axis)
+        return LightImage(pixels=pixels, name=path.stem, **_mapping(plugin))
 
     def _is_raw(self, plugin: Plugin) -> bool:
         """Return whether the values are linear, by `raw`, or by Mitsuba 0.x's `gamma`."""
@@ -159,6 +182,16 @@ class TextureReader:
             first, second = second, first
         picture, factor = checks(first, second, encoded=encoded)
         return Texture(picture=picture, factor=factor, filter="nearest", **_placed(plugin, plugin.transform("to_uv")))
+
+
+def _mapping(plugin: Plugin) -> dict[str, Any]:
+    """Return how a bitmap is placed, wrapped and filtered."""
+    both = plugin.value("wrap_mode", str, "repeat")
+    wraps = [WRAPS.get(plugin.value(f"wrap_mode_{axis}", str, both)) for axis in "uv"]
+    kind = FILTERS.get(plugin.value("filter_type", str, "bilinear"))
+    if wraps[0] is None or wraps[1] is None or kind is None:
+        plugin.refuse("its wrap_mode or filter_type is unknown", f"write {', '.join(WRAPS)}; {', '.join(FILTERS)}")
+    return {"wrap": (wraps[0], wraps[1]), "filter": kind, **_placed(plugin, plugin.transform("to_uv"))}
 
 
 def _placed(plugin: Plugin, to_uv: Doubles) -> dict[str, Any]:

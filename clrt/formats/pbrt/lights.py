@@ -1,4 +1,5 @@
-"""pbrt's lights without a shape: point, spot and distant; infinite ones are in infinite.py."""
+"""pbrt's lights without a shape: point, spot and distant; infinite ones are in infinite.py, those with an image in
+image_lights.py."""
 
 from __future__ import annotations
 
@@ -9,7 +10,9 @@ import numpy as np
 from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene_parts.notes import Notes
 from .entities import Entity
+from .image_lights import goniometric, projection
 from .named_spectra import Triple
+from .powers import powered, times
 from .spectra import Spectra
 from .tokens import Doubles
 
@@ -20,25 +23,28 @@ SHARPEST = 1e-3
 
 
 def light(entity: Entity, spectra: Spectra, notes: Notes, mirror: Doubles, old: bool) -> Light | None:
-    """Read a point, spot or distant light. mirror: (3, 3), from pbrt's world to clrt's. Raises UnsupportedError for
+    """Read a light that is not infinite. mirror: (3, 3), from pbrt's world to clrt's. Raises UnsupportedError for
     others; None if they may be left out."""
     entity.ignore(("samples", "nsamples"))
     if entity.kind == "point":
-        strength = _powered(spectra.emission(entity, "I"), entity, 4 * pi)
+        strength = powered(spectra.emission(entity, "I"), entity, 4 * pi)
         return PointLight(position=_place(entity, "from", mirror), intensity=strength)
     if entity.kind == "spot":
         return _spot(entity, spectra, notes, mirror, old)
+    if entity.kind == "projection":
+        return projection(entity, spectra, notes, mirror, old)
+    if entity.kind == "goniometric":
+        return goniometric(entity, spectra, notes, mirror, old)
     if entity.kind == "distant":
         start, end = (entity.point(name, default) for name, default in (("from", (0, 0, 0)), ("to", (0, 0, 1))))
         strength = spectra.emission(entity, "L")
         illuminance = entity.number("illuminance", -1.0)
         if illuminance > 0:
-            strength = _times(strength, illuminance)
+            strength = times(strength, illuminance)
         return DirectionalLight(direction=_direction(entity, start, end, mirror), irradiance=strength)
     entity.ignore()
-    notes.instead(
-        entity, f'light "{entity.kind}" is not supported', "use point, spot, distant or infinite", "it is left out"
-    )
+    known = "use point, spot, projection, goniometric, distant or infinite"
+    notes.instead(entity, f'light "{entity.kind}" is not supported', known, "it is left out")
     return None
 
 
@@ -46,7 +52,7 @@ def _spot(entity: Entity, spectra: Spectra, notes: Notes, mirror: Doubles, old: 
     outer = entity.number("coneangle", 30.0)
     inner = max(outer - entity.number("conedeltaangle", 5.0), 0.0)
     end, start = cos(radians(outer)), cos(radians(inner))
-    strength = _powered(spectra.emission(entity, "I"), entity, 2 * pi * ((1 - start) + (start - end) / 2))
+    strength = powered(spectra.emission(entity, "I"), entity, 2 * pi * ((1 - start) + (start - end) / 2))
     if outer > 90:
         notes.instead(entity, f"coneangle is {outer:g}", "write 90 or less", "90 is used", "spot wider than 90")
         outer = 90.0
@@ -63,17 +69,6 @@ def _spot(entity: Entity, spectra: Spectra, notes: Notes, mirror: Doubles, old: 
         outer_degrees=outer,
         falloff="cosine" if old else "angle",  # of v3's fourth power and v4's smooth step, by their mean
     )
-
-
-def _powered(strength: Triple, entity: Entity, total: float) -> Triple:
-    """Return the strength of a light of a `power`, if it has one, by the power of one of strength 1."""
-    power = entity.number("power", -1.0)
-    return _times(strength, power / total) if power > 0 else strength
-
-
-def _times(color: Triple, factor: float) -> Triple:
-    red, green, blue = (factor * part for part in color)
-    return red, green, blue
 
 
 def _place(entity: Entity, name: str, mirror: Doubles) -> Triple:

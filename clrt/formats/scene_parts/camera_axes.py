@@ -1,4 +1,4 @@
-"""Axes of cameras in the world."""
+"""Axes of cameras, and of lights with an image, in the world."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from .notes import Statement
 ODD = 1e-4
 
 
-def lengths_of(camera: Statement, axes: NDArray[np.float64], transform: str) -> tuple[float, float, float]:
-    """Return the lengths of a camera's axes, the columns (3, 3); these must be orthogonal and not stretch the image."""
+def lengths_of(
+    camera: Statement, axes: NDArray[np.float64], transform: str, what: str = "camera"
+) -> tuple[float, float, float]:
+    """Return the lengths of a camera's axes, the columns (3, 3); these must be orthogonal and not stretch the image.
+    what: a light instead."""
     x, y, z = np.linalg.norm(axes, axis=0).tolist()
     if (
         min(x, y, z) == 0
@@ -22,6 +25,6 @@ def lengths_of(camera: Statement, axes: NDArray[np.float64], transform: str) -> 
         camera.refuse(
             f"{transform} shears or stretches the image",
             "only rotate, translate and scale uniformly",
-            "camera that shears or stretches",
+            f"{what} that shears or stretches",
         )
     return x, y, z

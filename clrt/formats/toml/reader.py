@@ -75,7 +75,7 @@ class SceneReader:
         spheres = [self._sphere(values, f"sphere[{i}]") for i, values in enumerate(self._tables("sphere"))]
         lights: list[Light] = sky.lights() if sky else []
         lights += [
-            self._typed(LIGHTS, values, f"light[{i}]") or SUN  # keeps the later ones' numbers
+            self._light(values, f"light[{i}]") or SUN  # keeps the later ones' numbers
             for i, values in enumerate(self._tables("light"))
         ]
         models = [self._mesh(values, f"mesh[{i}]") for i, values in enumerate(self._tables("mesh"))]
@@ -102,7 +102,9 @@ class SceneReader:
 
     def _sources(self) -> Source:
         self._source.files += [
-            (picture, (self._path.parent / name).resolve()) for name, picture in self._textures.pictures.items()
+            (image, (self._path.parent / name).resolve())
+            for images in (self._textures.pictures, self._textures.pixels)
+            for name, image in images.items()
         ]
         return self._source
 
@@ -191,6 +193,13 @@ class SceneReader:
             self.problems += [f"{where}.{conflict}" for conflict in conflicts]
             return None if conflicts else made
         return None
+
+    def _light(self, values: Any, where: str) -> Light | None:
+        if isinstance(values, dict) and "image" in values:
+            name = values["image"]
+            table = (name, f"{where}.image") if isinstance(name, dict) else ({"image": name}, where)
+            values = {**values, "image": self._tried(self._textures.light_image, *table)}
+        return self._typed(LIGHTS, values, where)
 
     def _texture(self, values: Table, where: str) -> Texture:
         """Return the texture that a table describes, or a white one if it is invalid."""

@@ -20,6 +20,7 @@ from ...scene.animation import Animation, SceneAnimation
 from ...scene.default_sky import default_sky
 from ...scene.editing import free_name, materials_of
 from ...scene.geometry.instancing import meshes_by_id
+from ...scene.light_images import LightImage
 from ...scene.materials.material import Material
 from ...scene.materials.material_types import Diffuse
 from ...scene.materials.textures import Picture, Texture
@@ -28,7 +29,7 @@ from ...scene.provenance import material_of, shape_of
 from ...scene.sky.sky import Sky, SkyEnvironment
 from ...scene.validation.field_types import plain_value
 from ..gltf.glb_writer import mesh_glb
-from .texture_table import TextureTable
+from .texture_table import LightImageTable, TextureTable
 from .values import is_plain, toml_key, toml_value
 
 #: Fields that are written even at their default, since users change them first.
@@ -101,6 +102,7 @@ class _Writer:
         self._numbers: dict[str, int] = {}
         self._by_value = {material: name for name, material in reversed(self._materials.items())}
         self._pictures: dict[int, str] = {}
+        self._pixels: dict[int, str] = {}
         self._left: dict[tuple[object, ...], list[Mesh | Instance]] = {}
         self._give_back([*scene.meshes, *scene.instances])
         #: Lights that move with models, by the table of these, and those whose table was written.
@@ -305,17 +307,20 @@ class _Writer:
             value = plain_value(getattr(record, each.name))
             if isinstance(value, Texture):
                 yield f"{each.name} = {self._texture(value)}"
+            elif isinstance(value, LightImage):
+                yield f"{each.name} = {self._light_image(value)}"
             elif is_plain(value) and (each.name in TELLING or value != each.default):
                 yield f"{each.name} = {toml_value(value)}"
 
     def _texture(self, texture: Texture) -> str:
         """Return an inline table."""
-        values = {
-            each.name: plain_value(getattr(texture, each.name))
-            for each in fields(TextureTable)
-            if each.name != "image" and getattr(texture, each.name) != each.default
-        }
-        return toml_value({"image": self._picture(texture.picture), **values})
+        return toml_value({"image": self._picture(texture.picture), **_given(TextureTable, texture)})
+
+    def _light_image(self, image: LightImage) -> str:
+        """Return an inline table, or the file's name alone."""
+        values = _given(LightImageTable, image)
+        name = self._pixel_file(image)
+        return toml_value({"image": name, **values} if values else name)
 
     def _picture(self, picture: Picture) -> str:
         """Return the file of a texture's image, which is written next to the scene file if there is none."""
@@ -325,6 +330,15 @@ class _Writer:
             self._pictures[id(picture)] = name = self._beside(picture.name, ".png")
             self.files.texels[name] = picture.texels
         return self._pictures[id(picture)]
+
+    def _pixel_file(self, image: LightImage) -> str:
+        """Return the file of a light's image, which is written next to the scene file if there is none."""
+        if (file := self._source.file_of(image.pixels)) is not None:
+            return self._relative(file)
+        if id(image.pixels) not in self._pixels:
+            self._pixels[id(image.pixels)] = name = self._beside(image.name, ".exr")
+            self.files.pixels[name] = image.pixels
+        return self._pixels[id(image.pixels)]
 
     def _beside(self, name: str, suffix: str) -> str:
         """Return an unused file name for something of this name, next to the scene file."""
@@ -351,6 +365,15 @@ def _sky_of(scene: Scene) -> Sky | None:
     made, suns = found.sky.environment(), found.sky.lights()
     same = all(np.array_equal(getattr(found, each.name), getattr(made, each.name)) for each in fields(Environment))
     return found.sky if same and scene.lights[: len(suns)] == suns else None
+
+
+def _given(kind: type, record: Texture | LightImage) -> dict[str, Any]:
+    """Return the values of a table of this type, without its image and those at their defaults."""
+    return {
+        each.name: plain_value(getattr(record, each.name))
+        for each in fields(kind)
+        if each.name != "image" and getattr(record, each.name) != each.default
+    }
 
 
 def _moves(table: Mapping[str, Any]) -> bool:

@@ -47,6 +47,19 @@ SPHERE_LIGHT = record(
     center="3f4", radius="f4", radiance="3f4", texture="i4", sphere="i4", double_sided="i4", pad="2i4"
 )
 
+#: An image of lights. u_row, v_row: rows that map (u, v, 1) to the image's coordinates. first: of its texels.
+LIGHT_IMAGE = record(
+    u_row="3f4",
+    width="i4",
+    v_row="3f4",
+    height="i4",
+    first="i4",
+    wrap_u="i4",
+    wrap_v="i4",
+    nearest="i4",
+)
+LIGHT_TEXEL = record(value="3f4", pad="f4")
+
 ENVIRONMENT = record(color="3f4", pad="f4", width="i4", height="i4", rotation_cos="f4", rotation_sin="f4")
 SKY_TEXEL = record(radiance="3f4", density="f4")
 #: Fields are read one at a time, so records of half the size cost nothing: two of them share 16 bytes.
@@ -112,7 +125,7 @@ FILTER = np.dtype([("quantile", "f4")])
 
 
 class TextureNumber(int):
-    """Index of a texture, an int32 in records; −1 for none."""
+    """Index of a texture or of a light's image, an int32 in records; −1 for none."""
 
 
 def texture_field(name: str) -> str:

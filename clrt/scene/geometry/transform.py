@@ -114,14 +114,17 @@ def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
 
 
 def transform_light(light: Light, matrix: Matrix) -> Light:
-    """Return the light under an affine `matrix`, moved and rotated; its size, strength and range are kept, as in
-    glTF."""
+    """Return the light under an affine `matrix`, moved, rotated and its image mirrored; its size, strength and range
+    are kept, as in glTF."""
     changed: dict[str, Any] = {}
+    mirrors = np.linalg.det(matrix[:3, :3]) < 0
     for name, value in vars(light).items():
         if name == "position":
             changed[name] = tuple((matrix[:3] @ [*value, 1.0]).tolist())
-        elif name == "direction":
+        elif name in ("direction", "up"):
             changed[name] = tuple(unit(matrix[:3, :3] @ value).tolist())
+        elif name == "image" and value is not None and mirrors:
+            changed[name] = value.mirrored()
     return replace(light, **changed)
 
 

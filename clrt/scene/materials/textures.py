@@ -53,10 +53,7 @@ class Texture:
     @property
     def to_picture(self) -> NDArray[np.float64]:
         """The matrix (2, 3) from (u, v, 1) to image coordinates, both from 0 to 1."""
-        angle = np.radians(self.rotation_degrees)
-        c, s = np.cos(angle), np.sin(angle)
-        turned = np.array([[c, s], [-s, c]]) @ np.diag(self.scale)
-        return np.column_stack([turned, self.offset])
+        return picture_matrix(self.scale, self.rotation_degrees, self.offset)
 
     @property
     def image_axes(self) -> NDArray[np.float64]:
@@ -64,6 +61,14 @@ class Texture:
         (a, b), (c, d) = self.to_picture[:, :2]
         axes = np.array([np.sign(a * d - b * c) * np.array([d, c]), [-c, d]])
         return np.asarray(axes / np.hypot(c, d))
+
+
+def picture_matrix(scale: Pair, rotation_degrees: float, offset: Pair) -> NDArray[np.float64]:
+    """Return the matrix (2, 3) that scales coordinates (u, v, 1), rotates and translates them (see `Texture`)."""
+    angle = np.radians(rotation_degrees)
+    c, s = np.cos(angle), np.sin(angle)
+    turned = np.array([[c, s], [-s, c]]) @ np.diag(scale)
+    return np.column_stack([turned, offset])
 
 
 def untextured(value: Value | Texture) -> Value:

@@ -20,7 +20,7 @@ from ..fields.limits import Ge, Gt, Le, Limit, Lt
 from ..materials.textures import Texture
 
 #: Fields whose values are not plain data; the code that uses them validates them.
-ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "to_world"})
+ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "pixels", "to_world"})
 INT64_END = 2**63
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 #: More problems than this in one object are counted, not listed.

@@ -12,6 +12,7 @@ from ...errors import SceneError, UsageError
 from ..animation import Animation, ModelAnimation, SceneAnimation
 from ..camera_path import animation_problems
 from ..geometry.instancing import painted
+from ..light_images import LightImage
 from ..lights import LIGHTS
 from ..materials.material_types import MATERIALS, Diffuse, Material
 from ..model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere
@@ -271,13 +272,17 @@ def _environment_problems(environment: Environment) -> list[str]:
     problems = _object_problems(environment, Environment, "environment")
     if problems or environment.image is None:
         return problems
-    image = environment.image
-    where = "environment.image"
+    return _pixel_problems(environment.image, "environment.image")
+
+
+def _pixel_problems(image: object, where: str) -> list[str]:
+    """Return problems unless it is an array (h, w, 3) of float32, finite and at least 0."""
     if not isinstance(image, np.ndarray) or image.dtype != np.float32:
         kind = image.dtype if isinstance(image, np.ndarray) else type(image).__name__
         return [f"{where}: is {kind}; write a numpy array of float32"]
     if image.ndim != 3 or image.shape[2] != 3 or 0 in image.shape:
         return [f"{where}: has shape {image.shape}; it must be (height, width, 3) with at least one pixel"]
+    problems = []
     for bad, fault in ((~np.isfinite(image), "not finite"), (image < 0, "negative")):
         if bad.any():
             pixels = bad.any(axis=2)
@@ -292,5 +297,13 @@ def _environment_problems(environment: Environment) -> list[str]:
 def _light_problems(light: object, where: str) -> list[str]:
     if not isinstance(light, LIGHTS):
         return [f"{where}: {show(light)} is not a light; write a {' or '.join(kind.__name__ for kind in LIGHTS)}"]
-    problems = _object_problems(light, type(light), where)
+    problems = _object_problems(light, type(light), where) + _shown_problems(getattr(light, "image", None), where)
     return problems or [f"{where}.{conflict}" for conflict in light.conflicts()]
+
+
+def _shown_problems(image: object, where: str) -> list[str]:
+    """Return the problems of a light's image."""
+    if image is None:
+        return []
+    problems = _object_problems(image, LightImage, f"{where}.image")
+    return problems if not isinstance(image, LightImage) else problems + _pixel_problems(image.pixels, f"{where}.image")

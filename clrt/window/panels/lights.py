@@ -61,6 +61,7 @@ def _new(camera: Camera) -> dict[str, Light]:
     values = {
         "position": position,
         "direction": down,
+        "up": np.subtract(camera.look_at, camera.position).tolist(),
         "irradiance": (BRIGHT,) * 3,
         "intensity": (BRIGHT * far**2,) * 3,
         "radius": far / SMALL,

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ....scene.light_images import LightImage
 from ....scene.lights import Bounds, DistantBounds, Light
 from ....scene.materials.textures import Texture
 from ....scene.model import Scene
@@ -23,6 +24,7 @@ from .hidden_lights import hidden_lights, opaque_and_sides
 from .light_bounds import Doubles, distant_lights, joined, placed_lights, round_lights
 from .light_sampler import LightSampler, pack_choice
 from .light_types import LIGHT_KERNELS
+from .pack_light_images import PackedLightImages
 from .triangle_lights import pack_triangle_lights
 
 
@@ -56,7 +58,9 @@ def pack_emitters(scene: Scene, sky: EnvironmentMap, textures: PackedTextures) -
     of_sphere = np.full(len(scene.spheres), -1, np.int32)
     of_sphere[balls["sphere"]] = len(flat.records) + np.arange(len(balls))
     lights = {kernel: own for kernel in LIGHT_KERNELS if (own := lights_of(scene, kernel))}
-    records = {"triangle": flat.records, "sphere": balls, **{kernel: _records(own) for kernel, own in lights.items()}}
+    images = PackedLightImages()
+    records = {"triangle": flat.records, "sphere": balls}
+    records |= {kernel: _records(own, images) for kernel, own in lights.items()}
     counts = {kind: len(array) for kind, array in records.items() if len(array)}
     bounds = [light.bounds() for own in lights.values() for light in own]
     infinite = distant_lights([each for each in bounds if isinstance(each, DistantBounds)])
@@ -71,7 +75,8 @@ def pack_emitters(scene: Scene, sky: EnvironmentMap, textures: PackedTextures) -
         ]
     )
     choice = pack_choice(groups, infinite)
-    buffers = {f"{kind}_lights": (f"{kind.title()}Light", records[kind]) for kind in counts if kind != "sky"}
+    names = {kind: f"{kind.title().replace('_', '')}Light" for kind in counts if kind != "sky"}
+    buffers = {f"{kind}_lights": (name, records[kind]) for kind, name in names.items()} | images.buffers()
     features = frozenset[str]().union(*(light.features() for own in lights.values() for light in own))
     return PackedLights(buffers | choice.buffers, counts, features, flat.light, of_sphere, choice)
 
@@ -81,9 +86,12 @@ def lights_of(scene: Scene, kernel: str) -> list[Light]:
     return [light for light in scene.lights if light.sampled_by == kernel and not light.is_black]
 
 
-def _records(lights: Sequence[Light]) -> NDArray[Any]:
-    """Return the records of one or more lights that one kernel file samples."""
-    values = [light.parameters() for light in lights]
+def _records(lights: Sequence[Light], images: PackedLightImages) -> NDArray[Any]:
+    """Return the records of one or more lights that one kernel file samples, adding their images to `images`."""
+    values = [
+        {name: images.number(value) if isinstance(value, LightImage) else value for name, value in named.items()}
+        for named in (light.parameters() for light in lights)
+    ]
     records = np.zeros(len(values), parameter_record(values[:1]))
     for name in values[0]:
         records[name] = [named[name] for named in values]

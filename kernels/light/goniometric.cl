@@ -1,0 +1,26 @@
+// Goniometric light: intensity·image/d², where the image is equirectangular, its centre along the axis. World frame.
+#include "light/interface.cl"
+#include "light/image.cl"
+
+static inline LightSample goniometric_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
+    LightSample s;
+    s.target = GATHER3(scene->goniometric_lights, index, .position);
+    real3 d = sub(s.target, p);
+    real d2 = dot3(d, d), inverse = rsqrt(d2);
+    s.wi = scale(d, inverse);
+    real ahead = -dot3(s.wi, GATHER3(scene->goniometric_lights, index, .axis));
+    real right = -dot3(s.wi, GATHER3(scene->goniometric_lights, index, .right));
+    real top = -dot3(s.wi, GATHER3(scene->goniometric_lights, index, .top));
+    // Near a pole the arc's cosine loses half its digits; its sine does not.
+    real column = 0.5f + atan2(right, ahead) * (0.5f / PI);
+    real row = atan2(sqrt(ahead * ahead + right * right), top) * (1.0f / PI);
+    real3 image = light_image(scene, GATHER(ireal, scene->goniometric_lights, index, .image), column, row);
+    s.radiance = scale(mul(GATHER3(scene->goniometric_lights, index, .intensity), image), inverse * inverse);
+#if LIGHT_RANGES
+    s.radiance = scale(s.radiance, within_range(d2, GATHER(real, scene->goniometric_lights, index, .per_range2)));
+#endif
+    s.pdf = ONE;
+    s.infinite = NO_LANES;
+    s.delta = ALL_LANES;
+    return s;
+}
