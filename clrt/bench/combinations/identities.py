@@ -19,6 +19,8 @@ from ...scene.materials.material import Material
 from ...scene.materials.material_types import MATERIALS, Diffuse
 from ...scene.materials.textures import Texture
 from ...scene.model import Environment, Instance, Mesh, Scene, Sphere
+from ...scene.render_settings import Integrator
+from ...scene.validation.validate import scene_problems
 from .random_draws import Draws
 from .random_scenes import BLACK
 from .similarity import random_similarity
@@ -76,11 +78,10 @@ def integrators(scene: Scene, draws: Draws) -> list[Side]:
     """
     plain = with_materials(replace(scene, environment=Environment()), _without_local_form)
     plain = replace(plain, render=replace(scene.render, max_depth=2))
-    pinhole = scene.camera.projection == "perspective" and not scene.camera.aperture_radius
-    return [
-        Side(name, [replace(plain, render=replace(plain.render, integrator=name))])
-        for name in ("path", "direct", "local", *(("raster",) if pinhole else ()))
-    ]
+    names: tuple[Integrator, ...] = ("path", "direct", "local", "raster")
+    scenes = {name: replace(plain, render=replace(plain.render, integrator=name)) for name in names}
+    # Not every camera can be rasterised.
+    return [Side(name, [each]) for name, each in scenes.items() if name != "raster" or not scene_problems(each)]
 
 
 def brightness(scene: Scene, draws: Draws) -> list[Side]:
