@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     )
     from .scene.materials.textures import Picture as Picture, Texture as Texture
     from .scene.model import (
+        Backdrop as Backdrop,
         Camera as Camera,
         Environment as Environment,
         Instance as Instance,
@@ -98,7 +99,7 @@ _HOME = {
         "Phong",
         "Plastic",
     ),
-    "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
+    "scene.model": ("Backdrop", "Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
     "scene.view": ("View",),
     "scene.materials.textures": ("Picture", "Texture"),
     "scene.sky.sky": ("Sky",),

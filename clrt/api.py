@@ -19,7 +19,7 @@ from .output.denoise import Denoiser, denoised
 from .output.image import Image
 from .rendering.listed_keywords import listed
 from .rendering.render_report import render_report
-from .rendering.renderer import Renderer
+from .rendering.renderer import Renderer, State
 from .rendering.renderer_options import SETTINGS, RendererOptions
 from .rendering.stop_conditions import planned_spp
 from .scene.axes_and_units import Axis, LightUnit, Unit
@@ -140,6 +140,13 @@ class Stops(NamedTuple):
     error: float | None
 
 
+def image_of(renderer: Renderer, state: State) -> Image:
+    """Return the image in a state of its renderer, with its report and AOVs."""
+    return Image(
+        state.pixels, render_report(renderer, state), None, renderer.aovs(state), state.alpha, state.film.backdrop
+    )
+
+
 def _renderer(scene: Scene, stops: Stops, denoise: bool, options: RendererOptions) -> Renderer:
     options["spp"] = planned_spp(scene.render, *stops)
     options["first_hits"] = denoise or options.get("first_hits", False)
@@ -158,5 +165,5 @@ def _rendered(
         pass
     assert state is not None  # passes() yields at least once
     renderer.warnings.log(state.film)
-    image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))
+    image = image_of(renderer, state)
     return denoised(image, denoiser, guides, reference) if denoiser else image

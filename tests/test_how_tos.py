@@ -15,7 +15,7 @@ HOUSE = Path(__file__).parents[1]
 #: Page → number of its blocks, and files that they write.
 PAGES = {
     "rays": (4, ()),
-    "transparent-background": (1, ("product.png",)),
+    "transparent-background": (2, ("product.png", "product.exr")),
     "light-measurements": (2, ()),
     "sky": (2, ("noon.png", "outside.toml", "hour_09.png", "hour_21.png")),
     "dataset": (4, ("view_0003.exr", "spot/transforms.json", "spot/images/view_00003.png")),

@@ -160,7 +160,8 @@ class Outputs:
         from ..output.report import write_report
 
         if image.raw is not None:
-            self.save(replace(image, pixels=image.raw, raw=None, aovs={}), raw=True)
+            pixels, alpha = image.raw[..., :3], image.raw[..., 3] if image.raw.shape[2] == 4 else None
+            self.save(replace(image, pixels=pixels, alpha=alpha, raw=None, aovs={}), raw=True)
         self.save(image)
         if self.report is not None:
             self._write(self.report, lambda path: write_report(path, image.report))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,11 +35,11 @@ class Previews:
         """Write a preview of this state if one is due."""
         if self._every is None or state.seconds < self._next:
             return
-        from ..output.image import Image
-        from ..rendering.render_report import render_report
+        from ..api import image_of
 
         start = time.perf_counter()
-        self._write(Image(state.pixels, render_report(renderer, state) | self._results.header))
+        image = image_of(renderer, state)
+        self._write(replace(image, report=image.report | self._results.header, aovs={}))
         self._next = state.seconds + max(self._every, SHARE * (time.perf_counter() - start))
 
     def _write(self, image: Image) -> None:

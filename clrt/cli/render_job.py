@@ -266,12 +266,12 @@ def _write(
     expected: Any,
     progress: Progress,
 ) -> None:
+    from ..api import image_of
     from ..output.denoise import denoised
-    from ..output.image import Image
-    from ..rendering.render_report import render_report
 
     progress.phase("write")
-    image = Image(state.pixels, render_report(renderer, state) | results.header, aovs=renderer.aovs(state))
+    image = image_of(renderer, state)
+    image = replace(image, report=image.report | results.header)
     renderer.warnings.log(state.film)
     ratio = state.noise_ratio
     if ratio is not None and not 1 / RIGHT <= ratio <= RIGHT:

@@ -62,7 +62,7 @@ def _tree(compiled: CompiledScene) -> dict[str, Any]:
 
 
 def _program(scene: Scene, compiled: CompiledScene, aovs: Collection[str]) -> dict[str, Any]:
-    film = prod(scene.render.size) * compiled.choices.pixel.itemsize
+    film = prod(scene.render.size) * compiled.pixel.itemsize
     report: dict[str, Any] = {
         "features": compiled.features,
         "files": compiled.files,

@@ -7,15 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from ..api import image_of
 from ..output.denoise import Denoiser, denoised
-from ..output.image import Image
 from ..rendering.accumulation.accumulation import Accumulation
 from ..rendering.accumulation.device_pool import DevicePool
 from ..rendering.accumulation.launch_plan import LaunchPlan
 from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_pool
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
 from ..rendering.film.tiles import TILE, tiles_of
-from ..rendering.render_report import render_report
 from ..rendering.renderer import Renderer
 from ..rendering.stop_conditions import planned_spp
 from .orders import PictureOrder
@@ -33,7 +32,7 @@ class BandRenderer(Renderer):
     def begin_band(self, band: tuple[int, int]) -> None:
         """Start with tile rows first … end − 1."""
         self._band = band
-        self._progress.session = self._make_picture()
+        self._progress.session = self._new_picture()
         self._begin()
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
@@ -55,10 +54,11 @@ def render(key: str, order: PictureOrder) -> dict[str, Any]:
     for state in renderer.passes(spp=order.spp, time=order.time, error=order.error):
         pass
     assert state is not None  # there is at least one pass
-    image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))
+    image = image_of(renderer, state)
     if denoiser is not None:
         image = denoised(image, denoiser, guides)
-    return {"pixels": np.ascontiguousarray(image.pixels), "report": image.report, "raw": image.raw, "aovs": image.aovs}
+    found = {"pixels": np.ascontiguousarray(image.pixels), "report": image.report, "raw": image.raw, "aovs": image.aovs}
+    return found if image.backdrop is not None else {**found, "alpha": image.alpha}
 
 
 def _renderer(key: str, order: PictureOrder) -> Renderer:

@@ -1,6 +1,6 @@
 """Images too large for the client's memory: each band is rendered by one worker, and stored in a file until all exist.
 
-The client holds only the band that it just received. The file has the image's rows, 12 bytes per pixel, each at its
+The client holds only the band that it just received. The file has the image's rows, 4 bytes per channel, each at its
 offset; a manifest next to it lists the finished bands, so that an interrupted render can be resumed.
 """
 
@@ -35,7 +35,7 @@ from .whole_pictures import WholePictures
 HUGE = 1 << 23
 #: Approximate pixels per band. A worker has the band's film, with as many bytes per pixel.
 BAND_PIXELS = 1 << 20
-BYTES = 12
+BYTES = 4
 #: Fields of a band's report that do not apply to the image.
 OF_ONE = {
     "seconds",
@@ -64,6 +64,11 @@ class BandedPicture:
     def size(self) -> tuple[int, int]:
         """Return (width, height)."""
         return self.order.settled.render.size
+
+    @property
+    def channels(self) -> int:
+        """Return the channels of a pixel: with alpha, four."""
+        return 3 + self.order.settled.render.transparent
 
     @property
     def rows_path(self) -> Path:
@@ -106,7 +111,15 @@ class BandedPicture:
 
     def save(self, path: Path, view: str, exposure: float, metadata: dict[str, str]) -> Path:
         """Write the image once all bands are there. Raises OutputError."""
-        write_rows(path, self.size, self._pieces(), metadata=metadata, view=view, exposure=exposure)
+        write_rows(
+            path,
+            self.size,
+            self._pieces(),
+            channels=self.channels,
+            metadata=metadata,
+            view=view,
+            exposure=exposure,
+        )
         return path
 
     def forget(self) -> None:
@@ -182,11 +195,13 @@ class BandedPicture:
         """Return a band's offset in the file, and its size in bytes."""
         width, height = self.size
         first, end = band[0] * TILE, min(band[1] * TILE, height)
-        return first * width * BYTES, (end - first) * width * BYTES
+        row = width * self.channels * BYTES
+        return first * row, (end - first) * row
 
     def _keep(self, file: FileIO, manifest: Manifest, band: tuple[int, int], name: str, result: dict[str, Any]) -> None:
         at, _ = self._span(band)
-        content = np.ascontiguousarray(result["pixels"], np.float32).tobytes()
+        layers = [result["pixels"]] + ([result["alpha"][..., None]] if self.channels == 4 else [])
+        content = np.concatenate(layers, axis=2, dtype=np.float32).tobytes()
         try:
             file.seek(at)
             if file.write(content) != len(content):
@@ -211,7 +226,7 @@ class BandedPicture:
         with open(self.rows_path, "rb") as file:
             for band in self._bands().values():
                 content = file.read(self._span(band)[1])
-                yield np.frombuffer(content, np.float32).reshape(-1, width, 3)
+                yield np.frombuffer(content, np.float32).reshape(-1, width, self.channels)
 
 
 def _clamped_part(reports: list[dict[str, Any]]) -> float:

@@ -232,7 +232,7 @@ class FarmAccumulation(Accumulation):
 
     def film(self) -> Film:
         """Return the film so far, without tasks in flight, or samples of the next pass."""
-        return Film(row_by_row(self._ahead.shown(), self.size))
+        return Film(row_by_row(self._ahead.shown(), self.size), self.backdrop)
 
     def restore(self, film: Film, work: WorkQueue) -> None:
         """Resume from a film of this size and the work that produced it."""
@@ -286,7 +286,8 @@ def check_pixels(found: NDArray[Any], before: NDArray[Any], inside: NDArray[np.b
     """Raise BadResult unless these can be the pixels with `more` more samples; return how many were dropped."""
     if not isinstance(found, np.ndarray) or found.shape != before.shape or found.dtype != before.dtype:
         raise BadResult("it returned something other than pixels")
-    if not all(np.isfinite(found[name]).all() for name in ("sum", "sum_error", "square", "square_error")):
+    floats = [name for name in found.dtype.names or () if found.dtype[name].base.kind == "f"]
+    if not all(np.isfinite(found[name]).all() for name in floats):
         raise BadResult("it returned pixels that are not finite")
     kept, dropped = (found[name].astype(np.int64) - before[name] for name in ("count", "dropped"))
     if ((kept + dropped)[inside] != more).any():

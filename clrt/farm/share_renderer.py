@@ -33,7 +33,7 @@ class ShareRenderer:
         self._pool = make_pool(devices, compiled, LaunchPlan.of(settings, order.planned_spp))
         # Its film uses no memory while it is empty.
         self._picture = MultiDeviceAccumulation(self._pool, settings.size)
-        self._pixel = compiled[0].choices.pixel
+        self._pixel = compiled[0].pixel
 
     def share(self, tiles: NDArray[np.uint32], first: int, more: int, pixels: NDArray[Any] | None) -> NDArray[Any]:
         """See `remote.render_share`."""

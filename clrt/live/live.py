@@ -142,7 +142,8 @@ class Live:
         with self._lock:
             still, snapshot = self._still, self._snapshot
         report = render_report(*still) if still else {"integrator": snapshot.scene.render.integrator}
-        return Image(snapshot.shown, report, None if snapshot.denoised is None else snapshot.pixels)
+        raw = None if snapshot.denoised is None else snapshot.pixels
+        return Image(snapshot.shown, report, raw, alpha=snapshot.alpha)
 
     def close(self) -> None:
         """Stop the thread and wait for its end."""
@@ -249,6 +250,7 @@ class Live:
             "number": last.number + 1,
             "size": asked.size,
             "pixels": state.pixels,
+            "alpha": state.alpha if state.film.backdrop is None else None,
             "denoised": kept,
             "spp": state.spp,
             "seconds": state.seconds,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..device.malloc_trim import give_back
 from ..device.open import Device, open_devices
-from ..output.denoise import Denoiser
+from ..output.denoise import Denoiser, denoised_layers
 from ..rendering.accumulation.denoiser_guides import render_guides
 from ..rendering.renderer import Renderer, State
 from ..scene.model import Scene
@@ -108,7 +108,8 @@ class LiveRenderer:
         self._denoiser = self._denoiser or Denoiser()
         if self._guided is not renderer:
             self._guides, self._guided = render_guides(renderer.session), renderer
-        pixels = self._denoiser(state.pixels, self._guides["albedo"], self._guides["normal"])
+        layers = state.pixels, state.alpha, state.film.backdrop
+        pixels, _ = denoised_layers(*layers, self._denoiser, self._guides)
         done = time.perf_counter()
         self._denoise_from = done + (done - now) / DENOISING
         return pixels

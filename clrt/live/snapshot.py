@@ -21,7 +21,8 @@ class Snapshot:
     """Newest image. It is immutable, so it may be kept and read by any thread.
 
     number: how many images preceded it. pixels: (height, width, 3) float32, linear Rec. 709, smaller than `size`,
-    (width, height), during movements; denoised: likewise, of these samples or an earlier state, if available. spp:
+    (width, height), during movements; denoised: likewise, of these samples or an earlier state, if available. alpha:
+    (height, width) float32, the coverage of a transparent image, whose pixels are premultiplied, else None. spp:
     samples per pixel; seconds: their rendering time; noise: estimated √relMSE, or None; history: the same as samples
     grew, {spp, seconds, noise} each. scene, settings: those of the image, and `asked` the number of their edit or
     choice (Live.asked); error: why the newest request is not shown, or None. frames_per_second: images in the last
@@ -34,6 +35,7 @@ class Snapshot:
     pixels: NDArray[np.float32]
     size: tuple[int, int]
     denoised: NDArray[np.float32] | None = None
+    alpha: NDArray[np.float32] | None = None
     number: int = 0
     asked: int = 0
     spp: int = 0

@@ -22,11 +22,14 @@ _log = logging.getLogger(__name__)
 
 
 def layered(pixels: FloatArray, aovs: Pictures) -> tuple[FloatArray, list[str]]:
-    """Return all in one array (height, width, n) float32, and the channel names: R, G, B, albedo.R, depth.Z …"""
+    """Return all in one array (height, width, n) float32, and the channel names: R, G, B, albedo.R, depth.Z …
+
+    pixels: (height, width, 3), or 4 with associated alpha, the channel A.
+    """
     for name, aov in aovs.items():
         if aov.dtype.kind in "iu" and aov.max(initial=0) > LARGEST_ID:
             _log.warning("%s: numbers above %d are rounded in an .exr; Image.aovs has the exact ones", name, LARGEST_ID)
-    names = [*"RGB", *(channel for name in aovs for channel in channel_names(name))]
+    names = [*"RGBA"[: pixels.shape[2]], *(channel for name in aovs for channel in channel_names(name))]
     layers = [aov.astype(np.float32).reshape(*aov.shape[:2], -1) for aov in aovs.values()]
     return np.concatenate([pixels, *layers], axis=2), names
 

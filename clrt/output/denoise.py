@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import time
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,8 @@ from .image import Image
 from .image_error import mean_ratios, relmse
 
 FloatArray = NDArray[np.float32]
+#: Distance in pixels up to which coverage of other pixels matters for that of one.
+NEAR = 3
 
 
 class Denoiser:
@@ -53,26 +57,36 @@ class Denoiser:
         color: linear, in any unit; values that are not finite count as 0. albedo in [0, 1] and normal in [-1, 1] are
         assumed to be noise-free. Raises DeviceError if it fails, for example for lack of memory.
         """
-        import pyoidn
-
         finite = np.nan_to_num(color, nan=0, posinf=0, neginf=0)
         # Values below 1e-8 count as black, so the image is scaled by a power of two to a mean near 1.
         exponent = -int(np.frexp(np.mean(finite, dtype=np.float64))[1])
+        return np.asarray(np.ldexp(self._filtered(np.ldexp(finite, exponent), albedo, normal, hdr=True), -exponent))
+
+    def coverage(self, alpha: FloatArray, albedo: FloatArray, normal: FloatArray) -> FloatArray:
+        """Return the denoised coverage (height, width) in [0, 1]; it stays as it is where nothing around a pixel is
+        covered, or everything. Raises DeviceError if it fails."""
+        grey = np.repeat(alpha[..., None], 3, axis=2)
+        smooth = self._filtered(grey, albedo, normal, hdr=False).mean(axis=2).clip(0, 1)
+        return np.where(_around(alpha, np.maximum) == _around(alpha, np.minimum), alpha, smooth)
+
+    def _filtered(self, color: FloatArray, albedo: FloatArray, normal: FloatArray, hdr: bool) -> FloatArray:
+        import pyoidn
+
         images = {
             name: np.ascontiguousarray(image, np.float32)
-            for name, image in {"color": np.ldexp(finite, exponent), "albedo": albedo, "normal": normal}.items()
+            for name, image in {"color": color, "albedo": albedo, "normal": normal}.items()
         }
         images["output"] = np.empty_like(images["color"])
         with pyoidn.Filter(self._device) as network:
             for name, image in images.items():
                 network.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
-            network.set_bool("hdr", True)
+            network.set_bool("hdr", hdr)
             network.set_bool("cleanAux", True)
             network.set_quality(pyoidn.OIDN_QUALITY_HIGH)
             network.commit()
             network.execute()
             self._check()
-        return np.asarray(np.ldexp(images["output"], -exponent))
+        return images["output"]
 
     def _check(self) -> None:
         if problem := self._device.get_error():
@@ -84,10 +98,11 @@ def denoised(
 ) -> Image:
     """Return the image with denoised pixels, the original ones as `raw`, and `denoise` in its report (docs/report.md).
 
-    guides: `albedo` and `normal` of rendering.guides; reference: the ground truth; all of the image's shape.
+    guides: `albedo` and `normal` of rendering.guides; reference: the ground truth; all of the image's shape. Alpha is
+    denoised, too, and a backdrop is not.
     """
     start = time.perf_counter()
-    pixels = denoiser(image.pixels, guides["albedo"], guides["normal"])
+    pixels, alpha = denoised_layers(image.pixels, image.alpha, image.backdrop, denoiser, guides)
     done: dict[str, Any] = {
         "seconds": time.perf_counter() - start,
         "device": denoiser.name,
@@ -95,7 +110,35 @@ def denoised(
     }
     if reference is not None:
         done |= {"relmse": relmse(pixels, reference), "reference_bias": _bias(pixels, reference)}
-    return Image(pixels, {**image.report, "denoise": done}, image.pixels, image.aovs)
+    raw = image.layers
+    return replace(image, pixels=pixels, alpha=alpha, report={**image.report, "denoise": done}, raw=raw)
+
+
+def denoised_layers(
+    pixels: FloatArray,
+    alpha: FloatArray | None,
+    backdrop: FloatArray | None,
+    denoiser: Denoiser,
+    guides: Mapping[str, FloatArray],
+) -> tuple[FloatArray, FloatArray | None]:
+    """Return denoised pixels (height, width, 3) and coverage (height, width), see `Image`, whose scene is denoised by
+    itself."""
+    if alpha is None:
+        return denoiser(pixels, guides["albedo"], guides["normal"]), None
+    behind = np.zeros((1, 1, 3), np.float32) if backdrop is None else backdrop
+    scene = denoiser(pixels - (1 - alpha[..., None]) * behind, guides["albedo"], guides["normal"])
+    smooth = denoiser.coverage(alpha, guides["albedo"], guides["normal"])
+    empty = (smooth == 0)[..., None]
+    return np.where(empty, 0, scene) + (1 - smooth[..., None]) * behind, smooth
+
+
+def _around(values: FloatArray, choose: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
+    """Return the largest or smallest value within NEAR pixels of each pixel (height, width)."""
+    for axis in (0, 1):
+        padded = np.pad(values, [(NEAR, NEAR) if axis == each else (0, 0) for each in (0, 1)], "edge")
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEAR + 1, axis)
+        values = reduce(choose, np.moveaxis(windows, -1, 0))
+    return values
 
 
 def raw_path(path: Path) -> Path:

@@ -23,11 +23,13 @@ class FileFormat:
     """A format. levels: type of the samples of an image through a view transform; None for linear float samples.
 
     attributes: of OpenImageIO's writer. described: whether the description holds the metadata, not fields of their own.
+    alpha: whether it can hold an alpha channel.
     """
 
     levels: Level | None = np.uint8
     attributes: Mapping[str, str | int] = field(default_factory=dict)
     described: bool = False
+    alpha: bool = True
 
     def header(self, metadata: Mapping[str, str]) -> dict[str, str | int]:
         """Return the attributes of a file with this metadata."""
@@ -70,12 +72,12 @@ class EncodedFormat(FileFormat):
 #: level 3 with the library's choice of filters 0.22 s, for a 3 % smaller file. A .jpg without chroma subsampling, since
 #: colored edges are frequent in rendered images. OpenImageIO 3.2 fails to write an Exif folder into a .tif.
 PNG = FileFormat(attributes={"png:compressionLevel": 1, "png:filter": 32})
-JPEG = EncodedFormat(encoder="JPEG", options={"quality": 95, "subsampling": 0})
+JPEG = EncodedFormat(alpha=False, encoder="JPEG", options={"quality": 95, "subsampling": 0})
 TIFF = FileFormat(np.uint16, {"compression": "zip", "tiff:write_exif": 0}, described=True)
 FORMATS: dict[str, FileFormat] = {
     ".png": PNG,
     ".exr": FileFormat(None, {"compression": "zip"}),
-    ".hdr": FileFormat(None),
+    ".hdr": FileFormat(None, alpha=False),
     ".jpg": JPEG,
     ".jpeg": JPEG,
     ".tif": TIFF,

@@ -24,24 +24,38 @@ class Image:
 
     - pixels: (height, width, 3) float32, linear Rec. 709
     - report: how it was rendered, as in docs/report.md
-    - raw: the pixels before denoising; None if not denoised
+    - raw: the pixels before denoising, with the alpha of a transparent image as a fourth channel; None if not denoised
     - aovs: AOVs by name, see docs/aovs.md
+    - alpha: (height, width) float32, the fraction of each pixel that the scene covers, if it is transparent or has a
+      backdrop; else None. The pixels are premultiplied (associated alpha).
+    - backdrop: (height, width, 3) or (1, 1, 3), what the pixels have behind the scene; None if it is transparent there
     """
 
     pixels: NDArray[np.float32]
     report: dict[str, Any] = field(default_factory=dict)
     raw: NDArray[np.float32] | None = None
     aovs: dict[str, NDArray[np.generic]] = field(default_factory=dict)
+    alpha: NDArray[np.float32] | None = None
+    backdrop: NDArray[np.float32] | None = None
+
+    @property
+    def layers(self) -> NDArray[np.float32]:
+        """The pixels, (height, width, 3), or with the alpha channel of a transparent image, (height, width, 4)."""
+        if self.alpha is None or self.backdrop is not None:
+            return self.pixels
+        return np.concatenate([self.pixels, self.alpha[..., None]], axis=2)
 
     @with_default_errors
     def save(self, path: StrPath, *, view: str = "srgb", exposure: float = 0.0) -> Path:
         """Write .exr or .hdr (linear), or .png, .jpg, .webp, .tif (through `view`, after multiplication by 2^exposure).
 
-        The AOVs become layers of an .exr, and separate files for formats with a view. Raises OutputError if that fails.
+        The AOVs become layers of an .exr, and separate files for formats with a view. Alpha is associated in an .exr,
+        and unassociated in the others that have it; a .jpg and an .hdr show the scene over black. Raises OutputError
+        if that fails.
         """
-        pixels, data = self.pixels, shown_data(self.report.get("integrator", "path"), self.pixels)
+        pixels, data = self.layers, shown_data(self.report.get("integrator", "path"), self.pixels)
         if data is not None and is_shown(Path(path)):
-            pixels, view, exposure = data, "raw", 0.0
+            pixels, view, exposure = np.concatenate([data, pixels[..., 3:]], axis=2), "raw", 0.0
         write_image(Path(path), pixels, metadata=self.metadata(), view=view, exposure=exposure, aovs=self.aovs)
         return Path(path)
 

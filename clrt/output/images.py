@@ -17,7 +17,7 @@ from .aov_files import Pictures, drawn, files_beside, layered
 from .atomic_files import check_target, replacing
 from .file_formats import DESCRIPTION, FORMATS, EncodedFormat, described, format_of
 from .truncation import check_whole
-from .view_transform import check_view, to_levels
+from .view_transform import check_view, transparent_levels
 
 FloatArray = NDArray[np.float32]
 
@@ -25,6 +25,8 @@ EXTENSIONS = tuple(FORMATS)
 #: The largest value in RGBE: mantissa 255 of 256, exponent 127.
 RGBE_MAX = 255 / 256 * 2.0**127
 
+#: Attribute of OpenImageIO: the color of a pixel is not multiplied by its alpha.
+UNASSOCIATED = "oiio:UnassociatedAlpha"
 _log = logging.getLogger(__name__)
 
 #: Reads images that were written, or any others.
@@ -67,7 +69,8 @@ def write_image(
     view: str = "srgb",
     aovs: Pictures | None = None,
 ) -> None:
-    """Write (h, w, 3) float32 linear pixels in the format of the extension, atomically (see `replacing`).
+    """Write (h, w, 3) float32 linear pixels in the format of the extension, atomically (see `replacing`); or (h, w, 4)
+    with associated alpha, of which formats without alpha hold the colors over black.
 
     `aovs`, if any, become layers of an .exr, and separate files for formats with a view; an .hdr omits them.
 
@@ -81,10 +84,13 @@ def write_image(
     check_writable(path)
     check_view(view, exposure)
     kind, about, aovs = format_of(path), metadata or {}, aovs or {}
+    if pixels.shape[2] == 4 and not kind.alpha:
+        _log.warning("%s: %s has no alpha, so the image is written over black", path, path.suffix.lower())
+        pixels = pixels[..., :3]
     if kind.levels is not None:
         _tell_flaws(path, pixels)
         about = {**about, "clrt:view": view, "clrt:exposure": str(exposure)}
-        write_levels(path, to_levels(pixels, view, exposure, kind.levels), about)
+        write_levels(path, transparent_levels(pixels, view, exposure, kind.levels), about)
         for name, other in files_beside(path, aovs).items():
             write_levels(other, drawn(name, aovs[name], view, exposure), about)
     elif path.suffix.lower() == ".hdr":
@@ -111,19 +117,21 @@ def _tell_flaws(path: Path, pixels: FloatArray) -> None:
 
 
 def write_levels(path: Path, levels: NDArray[Any], metadata: Mapping[str, str]) -> None:
-    """Write (h, w, 3) unsigned integers in a format with a view, atomically. Raises OutputError."""
+    """Write (h, w, 3) unsigned integers in a format with a view, or (h, w, 4) with unassociated alpha, atomically.
+    Raises OutputError."""
     kind = format_of(path)
     if isinstance(kind, EncodedFormat):
         content = kind.encoded(path, levels, metadata)
         with replacing(path) as temporary:
             temporary.write_bytes(content)
     else:
-        _write(path, levels, kind.header(metadata))
+        unassociated = {UNASSOCIATED: 1} if levels.shape[2] == 4 else {}
+        _write(path, levels, kind.header(metadata) | unassociated, "RGBA"[: levels.shape[2]])
 
 
 def write_texels(path: Path, texels: NDArray[np.uint8]) -> None:
     """Write (h, w, 4) samples of a texture, with unassociated alpha, as a lossless .png."""
-    _write(path, texels, {"oiio:UnassociatedAlpha": 1}, ("R", "G", "B", "A"))
+    _write(path, texels, {UNASSOCIATED: 1}, "RGBA")
 
 
 def write_channels(path: Path, samples: FloatArray, channels: Sequence[str]) -> None:
@@ -161,6 +169,8 @@ def _write_file(
     # sRGB is the default; setting it explicitly takes 25 ms, in which OpenImageIO loads all its color spaces.
     spec = oiio.ImageSpec(width, height, len(channels), "float" if samples.dtype == np.float32 else samples.dtype.name)
     spec.channelnames = tuple(channels)
+    if "A" in channels:
+        spec.alpha_channel = channels.index("A")
     for name, value in attributes.items():
         spec.attribute(name, value)
     output = oiio.ImageOutput.create(str(path))

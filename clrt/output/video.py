@@ -1,4 +1,7 @@
-"""Videos from image files: .gif by pillow, .mp4 and .webm by ffmpeg, an optional dependency."""
+"""Videos from image files: .gif by pillow, .mp4 and .webm by ffmpeg, an optional dependency.
+
+Frames may have unassociated alpha: a .webm stores it, a .gif whether it is at least ½, an .mp4 shows them over black.
+"""
 
 from __future__ import annotations
 
@@ -31,6 +34,9 @@ COLORS = [
     "setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1:range=tv",
 ]
 VIDEOS = (".gif", *CODECS)
+#: Formats of pixels by channels, as they are read and stored; and options for alpha, which VP9 codes as a second video.
+PIXELS = {3: ("rgb24", "yuv420p"), 4: ("rgba", "yuva420p")}
+WITH_ALPHA = ["-auto-alt-ref", "0"]
 #: Maximum frames per second; browsers show faster ones at 10.
 FASTEST_GIF = 50.0
 #: Maximum duration of a frame in seconds: 16 bits, in hundredths.
@@ -80,10 +86,25 @@ def write_video(path: Path, pictures: Sequence[Path], fps: float) -> Path:
 
 
 def _frames(pictures: Sequence[Path]) -> Iterator[NDArray[np.uint8]]:
+    """Yield the frames, (height, width, 3), or 4 with alpha."""
     from imageio.v3 import imread
 
     for picture in pictures:
-        yield imread(picture)[..., :3]
+        yield imread(picture)
+
+
+def _over_black(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a frame without alpha, as viewers show it on black."""
+    if frame.shape[2] == 3:
+        return frame
+    return np.round(frame[..., :3] * (frame[..., 3:] / np.float32(255))).astype(np.uint8)
+
+
+def _cut_out(frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a frame with alpha rounded to 0 or 255, if it has any."""
+    levels = frame.copy()
+    levels[..., 3:] = np.where(frame[..., 3:] < 128, 0, 255)
+    return levels
 
 
 def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:
@@ -98,7 +119,9 @@ def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:
     encoded = BytesIO()
     with imopen(encoded, "w", plugin="pillow", extension=".gif") as file:
         for frame in _frames(pictures):
-            file.write(frame, **options)
+            if frame.shape[2] == 4:
+                options["disposal"] = 2  # else frames would show through the next one
+            file.write(_cut_out(frame), **options)
     path.write_bytes(encoded.getvalue())
 
 
@@ -107,9 +130,11 @@ def _write_by_ffmpeg(path: Path, pictures: Sequence[Path], fps: float) -> None:
     from imageio_ffmpeg import get_ffmpeg_exe
 
     codec, options = CODECS[path.suffix.lower()]
-    frames = _frames(pictures)
+    keeps_alpha = path.suffix.lower() == ".webm"
+    frames = (frame if keeps_alpha else _over_black(frame) for frame in _frames(pictures))
     first = next(frames)
-    height, width = first.shape[:2]
+    height, width, channels = first.shape
+    given, stored = PIXELS[channels]
     command = [
         get_ffmpeg_exe(),
         "-y",
@@ -118,7 +143,7 @@ def _write_by_ffmpeg(path: Path, pictures: Sequence[Path], fps: float) -> None:
         "-f",
         "rawvideo",
         "-pix_fmt",
-        "rgb24",
+        given,
         "-s",
         f"{width}x{height}",
         "-r",
@@ -128,8 +153,9 @@ def _write_by_ffmpeg(path: Path, pictures: Sequence[Path], fps: float) -> None:
         "-vcodec",
         codec,
         "-pix_fmt",
-        "yuv420p",
+        stored,
         *options,
+        *(WITH_ALPHA if channels == 4 else []),
         *COLORS,
         str(path),
     ]

@@ -143,3 +143,14 @@ def to_levels(pixels: FloatArray, view: str, exposure: float, kind: Level) -> ND
         linear = np.clip(np.nan_to_num(exposed, nan=0.0, posinf=BRIGHTEST), np.float32(0), np.float32(BRIGHTEST))
         levels[first : first + ROWS] = np.floor(most * np.clip(shown(linear), 0, 1) + np.float32(0.5))
     return levels
+
+
+def transparent_levels(pixels: FloatArray, view: str, exposure: float, kind: Level) -> NDArray[Any]:
+    """Convert as `to_levels`; pixels with associated alpha (h, w, 4) to levels with unassociated alpha: the view of the
+    pixels' color, 0 where nothing is covered, and the alpha itself."""
+    if pixels.shape[2] == 3:
+        return to_levels(pixels, view, exposure, kind)
+    alpha, most = np.clip(np.nan_to_num(pixels[..., 3:]), 0, 1), np.float32(np.iinfo(kind).max)
+    color = np.divide(pixels[..., :3], alpha, out=np.zeros_like(pixels[..., :3]), where=alpha > 0)
+    levels = np.floor(most * alpha + np.float32(0.5)).astype(kind)
+    return np.concatenate([to_levels(color, view, exposure, kind), levels], axis=2)

@@ -27,7 +27,9 @@ from .compile.compile_scene import CompiledScene
 from .compile.scene_compiler import SceneCompiler
 from .compile.visible_parts import same_world
 from .error_estimate.adaptive_sampling import most_planned
+from .film.backdrop import backdrop_of
 from .film.state import State as State, check_reference
+from .film.tiles import TILE, tiles_of
 from .listed_keywords import listed
 from .passes import PassLoop
 from .progress import Progress
@@ -59,7 +61,7 @@ class Renderer:
         on_phase("compile")
         self._planned_spp = kept.planned_spp if kept else most_planned(options.get("spp"), self.settings.adaptive)
         self._progress = Progress(
-            self._make_picture(before.session.scenes if before else ()),
+            self._new_picture(before.session.scenes if before else ()),
             self._planned_spp,
             percentile,
             self._checkpoints,
@@ -77,6 +79,15 @@ class Renderer:
         self._compiler: SceneCompiler = SceneCompiler.after(before._compiler if before else None, self.devices)
         self._compiled = self._compiler.compile(self.scene, self.choices, ahead=len(self.devices) == 1)
         self.warnings = PictureWarnings(self.scene, self.compiled.features)
+
+    def _new_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
+        """Return an image without samples, or a band of it, over its backdrop."""
+        picture, backdrop = self._make_picture(before), backdrop_of(self.scene)
+        first = picture.first_tile // tiles_of(self.settings.size)[1] * TILE
+        picture.backdrop = (
+            backdrop if backdrop is None or len(backdrop) == 1 else backdrop[first : first + picture.size[1]]
+        )
+        return picture
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
         return make_picture(self.devices, self._compiled, LaunchPlan.of(self.settings, self._planned_spp), before)
@@ -147,7 +158,7 @@ class Renderer:
 
     def _show(self, scene: Scene) -> None:
         self._compiled, self.scene = self._compiler.compile(scene, self.choices), scene
-        self._progress.session = self._make_picture(self.session.scenes)
+        self._progress.session = self._new_picture(self.session.scenes)
         self.warnings = PictureWarnings(scene, self.compiled.features)
 
     def _see(self) -> None:
@@ -169,7 +180,7 @@ class Renderer:
         if current.seen_by(camera, file).has_text_of(current):
             self.session.look(camera)
         else:
-            self._progress.session = self._make_picture()
+            self._progress.session = self._new_picture()
 
     def passes(
         self,

@@ -41,6 +41,8 @@ class PictureOptions(TypedDict, total=False):
     back_face_culling: Culling | None
     clamp_direct: float | None
     clamp_indirect: float | None
+    transparent: bool | None
+    transparent_glass: bool | None
 
 
 class TracingOptions(TypedDict, total=False):

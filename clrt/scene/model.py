@@ -136,13 +136,27 @@ class Environment:
     """Environment light: a constant `color`, or an environment map, `image` (h, w, 3) float32, equirectangular.
 
     Direction to texel: u = atan2(x, −z)/2π mod 1, v = acos(y)/π, row 0 on top; `rotation_degrees` rotates the
-    environment about +Y, counter-clockwise seen from above. Radiance = strength · (color or texel).
+    environment about +Y, counter-clockwise seen from above. Radiance = strength · (color or texel). camera_visible:
+    whether the camera sees it and the discs of the suns behind the scene; if not, it sees black there.
     """
 
     color: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     image: FloatArray | None = None
     strength: NonNegative = 1.0
     rotation_degrees: float = 0.0
+    camera_visible: bool = True
+
+
+@dataclass(eq=False, kw_only=True)
+class Backdrop:
+    """Backdrop, seen by the camera behind the scene instead of the environment; it emits no light.
+
+    A constant `color`, or an `image` (h, w, 3) float32, linear Rec. 709, which fills the rendered image and is cropped
+    to its shape.
+    """
+
+    color: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    image: FloatArray | None = None
 
 
 @dataclass(eq=False)
@@ -184,6 +198,7 @@ class Scene:
     """Everything needed to render an image.
 
     - camera: the one to render; cameras: others by name, including those of model files.
+    - backdrop: what the camera sees behind the scene, if not the environment.
     - animation: how the camera and models move.
     - materials: the scene file's named ones; meshes and spheres refer to these objects.
     - source: the files that its parts were read from, if any.
@@ -201,3 +216,4 @@ class Scene:
     animation: Animation | ModelAnimation | SceneAnimation | None = None
     materials: dict[str, Material] = field(default_factory=dict)
     source: Source | None = None
+    backdrop: Backdrop | None = None

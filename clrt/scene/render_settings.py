@@ -27,6 +27,8 @@ class RenderSettings:
     - shadows: whether the integrators local and raster cast shadow rays
     - back_face_culling: which rays ignore the back faces of materials that are not double_sided: "none", those of the
       "camera", or "all"
+    - transparent: whether the image has an alpha channel, the covered fraction of each pixel, and shows neither the
+      environment nor the backdrop; transparent_glass: whether what is behind the scene shows through smooth glass, too
     - clamp_direct, clamp_indirect: upper limits per channel of one contribution to a sample, for paths of depth 2 at
       most and for longer ones, in the integrators path and direct; 0 does not clamp
     """
@@ -51,6 +53,8 @@ class RenderSettings:
     clamp_indirect: NonNegative = option(
         0.0, "The same for indirect light: fewer fireflies, but the image is biased (too dark)."
     )
+    transparent: bool = option(False, "Write an alpha channel, without environment and backdrop behind the scene.")
+    transparent_glass: bool = option(False, "Let what is behind the scene show through smooth glass, unrefracted.")
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import ClrtError
 from ..live.snapshot import Snapshot
 from ..output.data_images import shown_data
-from ..output.view_transform import to_display
+from ..output.view_transform import transparent_levels
 from ..threads import Condition, beside
 
 
@@ -67,8 +67,12 @@ def tone_mapped(snapshot: Snapshot, look: DisplaySettings) -> ToneMapped:
     """Return the image as `clrt render --view --exposure` writes it to a .png."""
     data, error = shown_data(snapshot.scene.render.integrator, snapshot.pixels), None
     try:
-        levels = to_display(snapshot.shown, look.view, look.exposure) if data is None else to_display(data, "raw")
+        shown = snapshot.shown if data is None else data
+        if snapshot.alpha is not None:
+            shown = np.concatenate([shown, snapshot.alpha[..., None]], axis=2)
+        view, exposure = (look.view, look.exposure) if data is None else ("raw", 0.0)
+        levels = transparent_levels(shown, view, exposure, np.uint8)
     except ClrtError as problem:
         levels, error = np.zeros(snapshot.pixels.shape, np.uint8), str(problem)
-    opaque = np.full((*levels.shape[:2], 1), 255, np.uint8)
+    opaque = np.full((*levels.shape[:2], 4 - levels.shape[2]), 255, np.uint8)
     return ToneMapped(snapshot, look, np.concatenate([levels, opaque], axis=2), error)

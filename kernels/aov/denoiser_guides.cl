@@ -3,7 +3,8 @@
 // One work-item takes LANES pixels and averages `sample_count` camera rays per pixel. Rays follow mirrors and glass,
 // taking the likelier of reflection and refraction since guides should be noise-free. They record the first surface
 // that is neither, as Open Image Denoise recommends, with its albedo tinted by the specular colors and by absorption
-// in glass. The sky, suns included, stores its radiance, clamped to 1, as albedo, and no normal. World frame.
+// in glass. The sky, suns included, stores its radiance, clamped to 1, as albedo, and no normal; with ALPHA it stores
+// nothing where the camera sees it. World frame.
 //
 // To add one: add a field to the record GUIDE (clrt/rendering/compile/records.py) and to Seen, and compute it below.
 #include "integrator/camera_rays.cl"
@@ -30,6 +31,9 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
 #endif
 #if ENVIRONMENT
         ireal escaped = active & !hit;
+#if ALPHA
+        escaped = escaped & (depth > 1 ? ALL_LANES : NO_LANES);
+#endif
         if (ANY(escaped)) {
             real3 sky = environment_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO)));
             real3 bounded = vector(minimum(sky.x, ONE), minimum(sky.y, ONE), minimum(sky.z, ONE));

@@ -18,6 +18,9 @@ typedef struct {
 #if CLAMP
     real clamped;                 // energy that clamping removed from them, mean of the channels
 #endif
+#if ALPHA
+    real alpha, alpha_error;      // coverage of the same samples
+#endif
 } Accumulator;
 
 static inline void two_sum(real *sum, real *error, real x) {
@@ -55,6 +58,12 @@ static inline void accumulate_direct(Accumulator *a, real3 sample, ireal kept) {
 }
 #endif
 
+#if ALPHA
+static inline void accumulate_alpha(Accumulator *a, real alpha, ireal kept) {
+    two_sum(&a->alpha, &a->alpha_error, kept ? alpha : ZERO);
+}
+#endif
+
 static inline Accumulator load_pixels(global const Pixel *pixels, ireal pixel) {
     WHOLE(Pixel, film, pixels);
     return (Accumulator){GATHER3(film, pixel, .sum), GATHER3(film, pixel, .sum_error), GATHER3(film, pixel, .square),
@@ -65,6 +74,9 @@ static inline Accumulator load_pixels(global const Pixel *pixels, ireal pixel) {
 #endif
 #if CLAMP
                          GATHER(real, film, pixel, .clamped),
+#endif
+#if ALPHA
+                         GATHER(real, film, pixel, .alpha), GATHER(real, film, pixel, .alpha_error),
 #endif
     };
 }
@@ -94,6 +106,10 @@ static inline void store_pixels(global Pixel *film, ureal index, ireal stored, c
         pixel->rays = LANE_UINT(a->rays, lane);
 #if CLAMP
         pixel->clamped = LANE(a->clamped, lane);
+#endif
+#if ALPHA
+        pixel->alpha = LANE(a->alpha, lane);
+        pixel->alpha_error = LANE(a->alpha_error, lane);
 #endif
     }
 }

@@ -20,6 +20,15 @@ typedef struct { real3 origin, direction; } CameraRay;   // direction: unit
 
 #include CAMERA
 
+// The coverage of a sample, an argument of what computes its light if the film stores it.
+#if ALPHA
+#define ALPHA_PARAMETER , real *alpha
+#define ALPHA_ARGUMENT(alpha) , alpha
+#else
+#define ALPHA_PARAMETER
+#define ALPHA_ARGUMENT(alpha)
+#endif
+
 // The pixels of a work-item's lanes: LANES pixels of a tile of TILE x TILE. A launch covers pixels from first_pixel
 // on, in the order of `tiles`, row by row within each tile. A lane outside the image gets the pixel of the first lane
 // and is not `inside`.

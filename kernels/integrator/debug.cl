@@ -44,12 +44,13 @@ static inline ireal flag(ireal mask) { return mask ? (ireal)(1) : (ireal)(0); }
 
 // Record the path vertex and the emission found there.
 static inline void note_arrival(const Scene *scene, const Path *path, const Surface *surface, const Hits *hits, ireal hit,
-                                ireal escaped, VertexLanes *v) {
+                                ireal escaped, int depth, VertexLanes *v) {
     v->throughput = at_eye(path, splat(ONE));
     v->distance = hits->t;
     v->primitive = hit ? hits->primitive : (ireal)(-1);
     v->instance = hit ? hits->instance : (ireal)(0);
-    v->emission = add(emitted_light(scene, path, surface, hits->t, hit), escaped_light(scene, path, escaped));
+    v->emission = add(emitted_light(scene, path, surface, hits->t, hit),
+                      escaped_light(scene, path, LIT(path, depth, escaped)));
 #if EMITTERS
     real pdf;
     v->emitter = hit ? surface->light : (ireal)(-1);
@@ -153,7 +154,7 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
         Hits hits = first_surface(&scene, path.origin, path.wi, depth == 1, active, &sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
         absorb(&path, hit ? hits.t : (real)(INFINITY));
-        note_arrival(&scene, &path, &surface, &hits, hit, active & !hit, &v);
+        note_arrival(&scene, &path, &surface, &hits, hit, active & !hit, depth, &v);
         v.emission_clamp = clamp_factor(&launch, v.emission, depth);
         v.end = hit ? (ireal)(END_DEPTH) : (ireal)(END_ESCAPED);
         active = NO_LANES;

@@ -10,12 +10,15 @@
 #include "visibility/interface.cl"
 
 static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
-                               ureal *rays, real3 *direct, real *removed) {
+                               ureal *rays, real3 *direct, real *removed ALPHA_PARAMETER) {
     *rays += active ? (ureal)(1) : (ureal)(0);
 #if PRIMITIVES
     Surface surface;
     Hits hits = first_surface(scene, ray->origin, ray->direction, true, active, sampler, &surface);
     ireal hit = active & (hits.primitive >= 0);
+#if ALPHA
+    *alpha = hit ? ONE : ZERO;
+#endif
     if (!ANY(hit)) return splat(ZERO);
     return choose(hit, picture_value(scene, launch, ray->direction, hits.t, &surface), splat(ZERO));
 #else

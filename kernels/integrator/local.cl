@@ -13,6 +13,13 @@
 #include "surface/shading.cl"
 #include "visibility/interface.cl"
 
+// The lanes, of those that escape, that the environment lights.
+#if ALPHA
+#define LIT(clear, escaped) ((escaped) & !(clear))
+#else
+#define LIT(clear, escaped) escaped
+#endif
+
 // 1. Emission at the end of the ray: emissive surfaces and the environment.
 static inline real3 seen_light(const Scene *scene, real3 origin, real3 direction, const Surface *surface, real t, ireal hit,
                                ireal escaped) {
@@ -69,7 +76,10 @@ static inline real3 shade(const Scene *scene, const Surface *surface, const Shad
 
 // Return the radiance along camera rays. closest: their first hits, if those were rasterised.
 static inline real3 local_light(const Scene *scene, const Launch *launch, const CameraRay *ray, const Hits *closest,
-                                ireal active, Sampler *sampler, ureal *rays) {
+                                ireal active, Sampler *sampler, ureal *rays ALPHA_PARAMETER) {
+#if ALPHA
+    ireal clear = ALL_LANES;   // camera rays, and with CLEAR_GLASS those that smooth glass let through
+#endif
     real3 L = splat(ZERO), beta = splat(ONE), origin = ray->origin, direction = ray->direction, absorption = splat(ZERO);
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
@@ -86,7 +96,12 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
         beta = mul(beta, attenuated(absorption, hit ? hits.t : (real)(INFINITY)));
 #endif
         // Add emission at the hit, or of the environment
-        real3 seen = seen_light(scene, origin, direction, &surface, hits.t, hit, active & !hit);
+#if ALPHA
+        real3 passed = choose(active & !hit & clear, beta, splat(ZERO));
+        if (depth == 1) *alpha = hit ? ONE : ZERO;
+        else *alpha -= (passed.x + passed.y + passed.z) * (1.0f / 3.0f);
+#endif
+        real3 seen = seen_light(scene, origin, direction, &surface, hits.t, hit, LIT(clear, active & !hit));
         L = add(L, choose(active, mul(beta, seen), splat(ZERO)));
         active = hit;
         if (depth >= launch->max_depth || !ANY(active)) return L;
@@ -100,6 +115,11 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
         // 3. Follow mirrors and glass
         direction = sample.wi;
         active = active & sample.specular & (sample.pdf > 0.0f);
+#if CLEAR_GLASS
+        clear = clear & (dot3(direction, surface.ng) < 0.0f);
+#elif ALPHA
+        clear = NO_LANES;
+#endif
         beta = choose(active, mul(beta, sample.weight), beta);
 #if TRANSMISSION
         beta = choose(active, scale(beta, sample.spread), beta);
@@ -113,6 +133,6 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
 }
 
 static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
-                               ureal *rays, real3 *direct, real *removed) {
-    return local_light(scene, launch, ray, 0, active, sampler, rays);
+                               ureal *rays, real3 *direct, real *removed ALPHA_PARAMETER) {
+    return local_light(scene, launch, ray, 0, active, sampler, rays ALPHA_ARGUMENT(alpha));
 }

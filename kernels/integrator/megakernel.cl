@@ -3,10 +3,11 @@
 //
 // INTEGRATOR provides
 //
-//   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct, &removed)
+//   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct, &removed ALPHA_ARGUMENT(&alpha))
 //                                         radiance along the camera rays, 0 in inactive lanes; adds the number of rays
 //                                         traced to `rays`; sets `direct` if DIRECT_LIGHT is compiled in; adds the
-//                                         energy removed by clamping to `removed` if CLAMP is
+//                                         energy removed by clamping to `removed` if CLAMP is, and the coverage to
+//                                         `alpha` if ALPHA is
 //
 // PIXEL_MIDDLE: all samples use the ray through the pixel centre.
 #include "integrator/camera_rays.cl"
@@ -30,13 +31,20 @@ kernel void megakernel(SCENE_PARAMETERS, global Pixel *film, global const uint *
         ireal active = own.inside & camera_ray(&scene, &launch, own.x, own.y, place, &sampler, &ray);
         real3 direct;
         real removed = ZERO;
-        real3 seen = seen_along(&scene, &launch, &ray, active, &sampler, &pixels.rays, &direct, &removed);
+#if ALPHA
+        real alpha = ZERO;
+#endif
+        real3 seen = seen_along(&scene, &launch, &ray, active, &sampler, &pixels.rays, &direct, &removed
+                                ALPHA_ARGUMENT(&alpha));
         ireal kept = accumulate(&pixels, seen, own.inside);
 #if CLAMP
         pixels.clamped += kept ? removed : ZERO;
 #endif
 #if DIRECT_LIGHT
         accumulate_direct(&pixels, direct, kept);
+#endif
+#if ALPHA
+        accumulate_alpha(&pixels, alpha, kept);
 #endif
     }
     store_pixels(film, own.index, own.inside, &pixels);

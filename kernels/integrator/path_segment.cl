@@ -22,6 +22,9 @@ typedef struct {
 #if ATTENUATION
     real3 absorption;      // absorption coefficient along wi, per unit of length
 #endif
+#if CLEAR_GLASS
+    ireal clear;           // whether it has only passed through smooth glass
+#endif
 } Path;
 
 static inline Path path_along(real3 eye, real3 direction) {
@@ -36,6 +39,9 @@ static inline Path path_along(real3 eye, real3 direction) {
 #endif
 #if ATTENUATION
     path.absorption = splat(ZERO);
+#endif
+#if CLEAR_GLASS
+    path.clear = ALL_LANES;
 #endif
     return path;
 }
@@ -74,6 +80,34 @@ static inline void absorb(Path *path, real distance) {
     path->beta = mul(path->beta, attenuated(path->absorption, distance));
 #endif
 }
+
+#if ALPHA
+// Whether a path that escapes shows what is behind the scene, not its environment: a camera ray, or with CLEAR_GLASS one
+// that smooth glass let through.
+static inline ireal sees_through(const Path *path, int depth) {
+#if CLEAR_GLASS
+    return path->clear;
+#else
+    return depth == 1 ? ALL_LANES : NO_LANES;
+#endif
+}
+
+// What a segment adds to the coverage of its sample: 1 where a camera ray hits something, less what glass lets through.
+static inline real coverage(const Path *path, int depth, ireal hit, ireal escaped) {
+    if (depth == 1) return hit ? ONE : ZERO;
+#if CLEAR_GLASS
+    real3 passed = at_eye(path, splat(ONE));
+    return (escaped & path->clear) ? (passed.x + passed.y + passed.z) * (-1.0f / 3.0f) : ZERO;
+#else
+    return ZERO;
+#endif
+}
+
+// The lanes, of those that escape, that the environment lights.
+#define LIT(path, depth, escaped) ((escaped) & !sees_through(path, depth))
+#else
+#define LIT(path, depth, escaped) escaped
+#endif
 
 // 1. Emission at the end of the segment, with its MIS weight against light sampling: emissive surfaces …
 static inline real3 emitted_light(const Scene *scene, const Path *path, const Surface *surface, real t, ireal hit) {
@@ -166,6 +200,9 @@ static inline ireal go_on(Path *path, const Surface *surface, const Shading *sha
     path->n = choosing_normal(shading);
     path->pdf = sample.pdf;
     path->specular = sample.specular;
+#if CLEAR_GLASS
+    path->clear = path->clear & sample.specular & (dot3(sample.wi, surface->ng) < 0.0f);
+#endif
     active = active & !(sample.pdf <= 0.0f) & carries_light(sample.weight);
     path->beta = choose(active, mul(path->beta, sample.weight), path->beta);
 #if TRANSMISSION

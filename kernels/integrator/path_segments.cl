@@ -4,7 +4,7 @@
 
 // The light that a path brings from its segment `depth` on, 1 being the camera ray.
 static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path *path, int depth, ireal active,
-                                  Sampler *sampler, ureal *rays, real3 *direct, real *removed) {
+                                  Sampler *sampler, ureal *rays, real3 *direct, real *removed ALPHA_PARAMETER) {
     real3 L = splat(ZERO);
     for (;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
@@ -14,9 +14,12 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
         ireal hit = active & (hits.primitive >= 0);
         absorb(path, hit ? hits.t : (real)(INFINITY));
         L = add(L, clamped(launch, emitted_light(scene, path, &surface, hits.t, hit), depth, removed));
-        L = add(L, clamped(launch, escaped_light(scene, path, active & !hit), depth, removed));
+        L = add(L, clamped(launch, escaped_light(scene, path, LIT(path, depth, active & !hit)), depth, removed));
 #if DIRECT_LIGHT
         if (depth <= 2) *direct = L;
+#endif
+#if ALPHA
+        *alpha += coverage(path, depth, hit, active & !hit);
 #endif
         active = hit;
         if (depth >= launch->max_depth || !ANY(active)) return L;

@@ -64,6 +64,15 @@ typedef struct {
     uint slot, dimension, rays;   // rays: traced so far
 } Travel;
 
+// The word of a path's rays and flags.
+#if CLEAR_GLASS
+#define FLAGS 2
+#define RAYS_WORD(t) t->rays << FLAGS | (uint)(t->path.clear != 0) << 1 | (uint)(t->path.specular != 0)
+#else
+#define FLAGS 1
+#define RAYS_WORD(t) t->rays << FLAGS | (uint)(t->path.specular != 0)
+#endif
+
 static inline float4 row_of(real3 vector, float last) { return (float4)(vector.x, vector.y, vector.z, last); }
 static inline real3 xyz(float4 row) { return vector(row.x, row.y, row.z); }
 
@@ -76,7 +85,7 @@ static inline void store_path(const Queues *q, int depth, uint place, const Trav
     row[0] = row_of(t->path.origin, as_float(t->slot));
     row[q->capacity] = row_of(t->path.wi, as_float(t->dimension));
     row[2 * q->capacity] = row_of(t->path.p, t->path.pdf);
-    row[3 * q->capacity] = row_of(t->path.n, as_float(t->rays << 1 | (uint)(t->path.specular != 0)));
+    row[3 * q->capacity] = row_of(t->path.n, as_float(RAYS_WORD(t)));
 #if TRANSMISSION
     row[4 * q->capacity] = row_of(t->path.beta, t->path.spread);
 #else
@@ -100,7 +109,10 @@ static inline Travel load_path(const Queues *q, int depth, uint place) {
     t.path.pdf = p.w;
     t.path.n = xyz(n);
     t.path.specular = as_int(n.w) & 1;
-    t.rays = as_uint(n.w) >> 1;
+    t.rays = as_uint(n.w) >> FLAGS;
+#if CLEAR_GLASS
+    t.path.clear = as_int(n.w) >> 1 & 1;
+#endif
     t.path.beta = xyz(beta);
 #if TRANSMISSION
     t.path.spread = beta.w;
@@ -158,7 +170,8 @@ static inline ShadowRay load_shadow(const Queues *q, uint place, uint *slot) {
 }
 #endif
 
-// The light of a slot: three rows of one word, three of its direct light, and one of the energy removed by clamping.
+// The light of a slot: three rows of one word, three of its direct light, one of the energy removed by clamping, and one
+// of its coverage.
 #define DIRECT_ROW 3
 #if DIRECT_LIGHT
 #define REMOVED_ROW 6
@@ -166,9 +179,14 @@ static inline ShadowRay load_shadow(const Queues *q, uint place, uint *slot) {
 #define REMOVED_ROW 3
 #endif
 #if CLAMP
-#define LIGHT_ROWS (REMOVED_ROW + 1)
+#define ALPHA_ROW (REMOVED_ROW + 1)
 #else
-#define LIGHT_ROWS REMOVED_ROW
+#define ALPHA_ROW REMOVED_ROW
+#endif
+#if ALPHA
+#define LIGHT_ROWS (ALPHA_ROW + 1)
+#else
+#define LIGHT_ROWS ALPHA_ROW
 #endif
 
 static inline real3 slot_light(const Queues *q, uint slot, uint row) {

@@ -87,6 +87,9 @@ static inline void shade_hit(const Scene *scene, const Queues *q, const Launch *
     Path *path = &shaded->travel.path;
     Surface surface = surface_at(scene, path->origin, path->wi, hits);
     absorb(path, hits->t);
+#if ALPHA
+    q->light[shaded->travel.slot + ALPHA_ROW * q->capacity] += coverage(path, depth, true, false);
+#endif
     add_light(q, launch, shaded->travel.slot, emitted_light(scene, path, &surface, hits->t, true), depth);
     if (depth >= launch->max_depth) return;
 #if DISPERSION
@@ -125,7 +128,10 @@ kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, 
             if (hits.primitive < 0) {
                 Path *path = &shaded.travel.path;
                 absorb(path, INFINITY);
-                add_light(&q, &launch, shaded.travel.slot, escaped_light(&scene, path, true), depth);
+#if ALPHA
+                q.light[shaded.travel.slot + ALPHA_ROW * q.capacity] += coverage(path, depth, false, true);
+#endif
+                add_light(&q, &launch, shaded.travel.slot, escaped_light(&scene, path, LIT(path, depth, true)), depth);
             }
 #if PRIMITIVES
             else shade_hit(&scene, &q, &launch, tiles, depth, &hits, &shaded);
@@ -171,6 +177,9 @@ kernel void update_film(QUEUE_PARAMETERS, global Pixel *film, global const uint 
 #endif
 #if CLAMP
         pixel.clamped += kept ? q.light[slot + REMOVED_ROW * q.capacity] : ZERO;
+#endif
+#if ALPHA
+        accumulate_alpha(&pixel, q.light[slot + ALPHA_ROW * q.capacity], kept);
 #endif
     }
     store_pixels(film, own.index, true, &pixel);

@@ -29,8 +29,16 @@ kernel void raster(SCENE_PARAMETERS, global Pixel *film, global const uint *tile
         rasterise(&bins, &launch, LANE_UINT(own[0].x, 0), LANE_UINT(own[0].y, 0), rows, count);
         for (int i = 0; i < count; ++i) {
             Hits closest = row_hits(rows + i);
-            real3 L = local_light(&scene, &launch, &rows[i].ray, &closest, own[i].inside, samplers + i, &pixels[i].rays);
+#if ALPHA
+            real alpha = ZERO;
+#endif
+            real3 L = local_light(&scene, &launch, &rows[i].ray, &closest, own[i].inside, samplers + i, &pixels[i].rays
+                                  ALPHA_ARGUMENT(&alpha));
+#if ALPHA
+            accumulate_alpha(pixels + i, alpha, accumulate(pixels + i, L, own[i].inside));
+#else
             accumulate(pixels + i, L, own[i].inside);
+#endif
         }
     }
     for (int i = 0; i < count; ++i) store_pixels(film, own[i].index, own[i].inside, pixels + i);

@@ -41,6 +41,9 @@ typedef struct {
 #if CLAMP
     float removed[WAVE];                 // energy removed by clamping
 #endif
+#if ALPHA
+    float alpha[WAVE];                   // coverage
+#endif
     const Launch *launch;
     uint x, y, sample;                   // of slot 0
     uint dimension, rays;
@@ -76,6 +79,16 @@ static inline void add_light(Wave *w, ureal slot, real3 found, int edges) {
     }
 }
 
+#if ALPHA
+// Add to the coverage of the slots of some lanes.
+static inline void add_coverage(Wave *w, ureal slot, real found, ireal some) {
+    for (uint bits = mask_bits(some); bits; bits &= bits - 1) {
+        int lane = first_bit(bits);
+        w->alpha[LANE_UINT(slot, lane)] += LANE(found, lane);
+    }
+}
+#endif
+
 // Stage 1: generate camera rays. Each stage returns the number of paths, or shadow rays, for the next one.
 __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int slots) {
     int count = 0;
@@ -96,6 +109,9 @@ __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int sl
 #endif
 #if CLAMP
         vstore8(ZERO, 0, w->removed + i);
+#endif
+#if ALPHA
+        vstore8(ZERO, 0, w->alpha + i);
 #endif
         dimension = sampler.dimension;
     }
@@ -132,7 +148,10 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
         Arrival a;
         LOAD(a, w->arrivals, i)
         ireal active = lanes_of(i, count), hit = active & (a.hits.primitive >= 0), missed = active & !hit;
-#if ENVIRONMENT
+#if ALPHA
+        if (depth == 1) add_coverage(w, a.travel.slot, coverage(&a.travel.path, depth, hit, missed), hit);
+#endif
+#if ENVIRONMENT || CLEAR_GLASS
         if (ANY(missed)) PACK(a.travel, missed, w->escapes, escaped)
 #endif
         if (ANY(missed) || arrived < i) PACK(a, hit, w->arrivals, arrived)
@@ -143,7 +162,11 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
         Travel travel;
         LOAD(travel, w->escapes, i)
         absorb(&travel.path, (real)(INFINITY));
-        add_light(w, travel.slot, escaped_light(scene, &travel.path, lanes_of(i, escaped)), depth);
+        add_light(w, travel.slot, escaped_light(scene, &travel.path, LIT(&travel.path, depth, lanes_of(i, escaped))), depth);
+#if CLEAR_GLASS
+        ireal passed = lanes_of(i, escaped);
+        if (depth > 1) add_coverage(w, travel.slot, coverage(&travel.path, depth, !passed, passed), passed);
+#endif
     }
     return arrived;
 }
@@ -230,6 +253,9 @@ static inline void add_samples(const Wave *w, global Pixel *film, uint first_pix
 #endif
 #if CLAMP
             pixels.clamped += kept ? vload8(0, w->removed + first) : ZERO;
+#endif
+#if ALPHA
+            accumulate_alpha(&pixels, vload8(0, w->alpha + first), kept);
 #endif
         }
         store_pixels(film, index, inside, &pixels);

@@ -7,8 +7,17 @@
 #define ONE_SIDED(value) ((value) != 0.0f)
 #endif
 
+#if CAMERA_HIDDEN
+#define HIDDEN 2.0f            // added to the one_sided of surfaces that the camera does not see
+#define SIDED(name) fmod(PARAMETER(name, one_sided), (real)(HIDDEN))
+#define HIDE_FROM_CAMERA(name) if (from_camera) visible = visible & !(is_type & (PARAMETER(name, one_sided) >= HIDDEN));
+#else
+#define SIDED(name) PARAMETER(name, one_sided)
+#define HIDE_FROM_CAMERA(name)
+#endif
+
 // The opacity of surfaces for light along `direction`, before turn_towards. from_camera: whether the ray is a camera
-// ray, to which some surfaces are culled on their back side.
+// ray, to which some surfaces are invisible, or culled on their back side.
 static inline real opacity_at(const Scene *scene, const Surface *surface, real3 direction, int from_camera) {
     real opacity = ONE, cutoff = ZERO;     // other materials are opaque, whatever the alpha of vertex colours
     ireal visible = ALL_LANES, from_behind = dot3(surface->ng, direction) > 0.0f;
@@ -18,7 +27,8 @@ static inline real opacity_at(const Scene *scene, const Surface *surface, real3 
         if (ANY(is_type)) { \
             opacity = is_type ? PARAMETER(name, opacity) : opacity; \
             cutoff = is_type ? PARAMETER(name, cutoff) : cutoff; \
-            visible = visible & !(is_type & from_behind & ONE_SIDED(PARAMETER(name, one_sided))); \
+            visible = visible & !(is_type & from_behind & ONE_SIDED(SIDED(name))); \
+            HIDE_FROM_CAMERA(name) \
         } \
     }
     OPACITY_TYPES(OPACITY_OF)

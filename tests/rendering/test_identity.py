@@ -59,6 +59,8 @@ OTHER: dict[str, Any] = {
     "back_face_culling": "all",
     "clamp_direct": 1.5,
     "clamp_indirect": 2.5,
+    "transparent": True,
+    "transparent_glass": True,
     "lanes": 1,
     "layout": "bvh2",
     "builder": "midpoint",

@@ -15,7 +15,7 @@ from ...scene.geometry.instancing import meshes_by_id
 from ...scene.lights import LIGHTS, Light
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
 from ...scene.materials.textures import WHITE, Texture
-from ...scene.model import Camera, Environment, Instance, Model, Origin, RenderSettings, Scene, Source, Sphere
+from ...scene.model import Backdrop, Camera, Environment, Instance, Model, Origin, RenderSettings, Scene, Source, Sphere
 from ...scene.model_pose import with_poses
 from ...scene.provenance import material_of, parts_of
 from ...scene.sky.sky import Sky
@@ -38,6 +38,7 @@ SECTIONS = (
     "render",
     "environment",
     "sky",
+    "backdrop",
     "materials",
     "mesh",
     "instance",
@@ -69,6 +70,7 @@ class SceneReader:
         render = self._build(RenderSettings, self._table("render"), "render")
         sky = self._sky()
         environment = sky.environment() if sky else self._environment(self._table("environment"))
+        backdrop = self._backdrop(self._table("backdrop")) if "backdrop" in self._document else None
         for name, values in self._table("materials").items():
             where = f"materials.{name}"
             self._materials[name] = self._typed(MATERIALS, values, where) or Diffuse()
@@ -93,6 +95,7 @@ class SceneReader:
             camera=self._named_camera(lens) if "name" in lens else camera,
             cameras=self._cameras,
             environment=environment or Environment(),
+            backdrop=backdrop,
             render=render or RenderSettings(),
             name=name_of(self._path),
             animation=self._with_models(self._animation()),
@@ -216,11 +219,7 @@ class SceneReader:
                 for key in ("color", "image")
                 if key in values
             ]
-        if "image" in values:
-            image = self._picture(values["image"])
-            self._source.files += [] if image is None else [(image, (self._path.parent / values["image"]).resolve())]
-            if "color" in values:
-                self.problems.append("environment: has both a color and an image; keep one of them")
+        image = self._picture(values, "environment") if "image" in values else image
         return self._build(Environment, {**values, "image": image}, "environment")
 
     def _sky(self) -> Sky | None:
@@ -236,15 +235,25 @@ class SceneReader:
         self.problems += problems
         return None if problems else self._tried(lambda: Sky(**usable(Sky, values)))
 
-    def _picture(self, name: Any) -> Any:
+    def _backdrop(self, values: Table) -> Backdrop | None:
+        image = self._picture(values, "backdrop") if "image" in values else None
+        return self._build(Backdrop, {**values, "image": image}, "backdrop")
+
+    def _picture(self, values: Table, where: str) -> Any:
+        """Return the image of a table without a color; None if it cannot be read."""
+        name = values["image"]
+        if "color" in values:
+            self.problems.append(f"{where}: has both a color and an image; keep one of them")
         if not isinstance(name, str):
-            self.problems.append(f"environment.image: {show(name)} is not a string; write a file name in quotes")
+            self.problems.append(f"{where}.image: {show(name)} is not a string; write a file name in quotes")
             return None
         try:
-            return read_picture(self._path.parent / name)
+            image = read_picture(self._path.parent / name)
         except SceneError as error:
-            self.problems += [f"environment.image: {problem}" for problem in error.problems]
+            self.problems += [f"{where}.image: {problem}" for problem in error.problems]
             return None
+        self._source.files.append((image, (self._path.parent / name).resolve()))
+        return image
 
     def _material(self, values: Table, where: str) -> Material | None:
         """Return the material that the table names, or None if it names none."""

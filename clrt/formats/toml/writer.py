@@ -24,7 +24,7 @@ from ...scene.light_images import LightImage
 from ...scene.materials.material import Material
 from ...scene.materials.material_types import Diffuse
 from ...scene.materials.textures import Picture, Texture
-from ...scene.model import Environment, Instance, Mesh, Origin, Scene, Source
+from ...scene.model import Backdrop, Environment, Instance, Mesh, Origin, Scene, Source
 from ...scene.provenance import material_of, shape_of
 from ...scene.sky.sky import Sky, SkyEnvironment
 from ...scene.validation.field_types import plain_value
@@ -121,6 +121,7 @@ class _Writer:
         ]
         sky = _sky_of(scene)
         head += self._section("[sky]", sky) if sky else self._environment(scene.environment)
+        head += self._backdrop(scene.backdrop) if scene.backdrop else ()
         for light in scene.lights[len(sky.lights()) if sky else 0 :]:
             if id(light) not in self._moving:
                 head += self._section("[[light]]", light, light.kernel)
@@ -152,21 +153,31 @@ class _Writer:
                 yield from self._section("[[keyframe]]", keyframe)
 
     def _environment(self, sky: Environment) -> Iterator[str]:
-        image = sky.image
-        yield from (
-            line for line in self._section("[environment]", sky) if image is None or not line.startswith("color = ")
-        )
-        if image is None:
-            return
+        yield from self._colored("[environment]", sky)
+        if sky.image is not None and self._source.file_of(sky.image) is None and _is_default(sky.image):
+            yield 'sky = "default"'
+        elif sky.image is not None:
+            yield self._image(sky.image, "sky")
+
+    def _backdrop(self, backdrop: Backdrop) -> Iterator[str]:
+        yield from self._colored("[backdrop]", backdrop)
+        if backdrop.image is not None:
+            yield self._image(backdrop.image, "backdrop")
+
+    def _colored(self, title: str, record: Environment | Backdrop) -> Iterator[str]:
+        """Yield a table without its color if it has an image."""
+        for line in self._section(title, record):
+            if record.image is None or not line.startswith("color = "):
+                yield line
+
+    def _image(self, image: NDArray[np.float32], name: str) -> str:
+        """Return the key of an image, which is written next to the scene file if it was not read from one."""
         file = self._source.file_of(image)
         if file is not None:
-            yield f"image = {toml_value(self._relative(file))}"
-        elif np.array_equal(image, _default_image()):
-            yield 'sky = "default"'
-        else:
-            name = self._beside("sky", ".exr")
-            self.files.pixels[name] = image
-            yield f"image = {toml_value(name)}"
+            return f"image = {toml_value(self._relative(file))}"
+        beside = self._beside(name, ".exr")
+        self.files.pixels[beside] = image
+        return f"image = {toml_value(beside)}"
 
     def _read_meshes(self) -> Iterator[str]:
         """Yield the tables that were read, if they are unchanged, and their instances."""
@@ -381,10 +392,9 @@ def _moves(table: Mapping[str, Any]) -> bool:
     return "animation" in table and "time" not in table
 
 
-def _default_image() -> NDArray[np.float32]:
-    image = default_sky().image
-    assert image is not None
-    return image
+def _is_default(image: NDArray[np.float32]) -> bool:
+    default = default_sky().image
+    return default is not None and np.array_equal(image, default)
 
 
 def _is_plain(material: Material) -> bool:

@@ -29,6 +29,8 @@ class Accumulation(ABC):
 
     def __init__(self, size: tuple[int, int]) -> None:
         self.size = size
+        #: What is behind the scene in its films (see `Film`).
+        self.backdrop: NDArray[np.float32] | None = None
         self.work = WorkQueue(np.zeros(tiles_of(size), np.int64))
         self._torn = False
 

@@ -51,7 +51,7 @@ class DeviceWorker:
         tiles: int,
         before: Sequence[SceneOnDevice] = (),
     ) -> None:
-        self._tile_bytes = TILE_PIXELS * compiled.choices.pixel.itemsize
+        self._tile_bytes = TILE_PIXELS * compiled.pixel.itemsize
         self.window_tiles = max(1, min(tiles, min(WINDOW, largest_film(device, compiled)) // self._tile_bytes))
         film_bytes = IN_FLIGHT * self.window_tiles * self._tile_bytes
         self.scene = SceneOnDevice(device, compiled, launch, film_bytes, windows=True, before=before)

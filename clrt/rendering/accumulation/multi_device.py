@@ -34,7 +34,7 @@ class MultiDeviceAccumulation(LocalAccumulation):
     def __init__(self, pool: DevicePool, size: tuple[int, int], first_tile: int = 0) -> None:
         super().__init__(size)
         self.pool, self.first_tile = pool, first_tile
-        tiles, pixel = self.work.samples.size, self.compiled.choices.pixel
+        tiles, pixel = self.work.samples.size, self.compiled.pixel
         check_host(tiles * TILE_PIXELS * pixel.itemsize, *size)
         self._film = np.zeros((tiles, TILE_PIXELS), pixel)
         self._numbers = np.arange(first_tile, first_tile + tiles, dtype=np.uint32)
@@ -87,7 +87,7 @@ class MultiDeviceAccumulation(LocalAccumulation):
     def film(self) -> Film:
         """Return the current film; waits for the launches in flight."""
         self.wait()
-        film = Film(row_by_row(self._film, self.size))
+        film = Film(row_by_row(self._film, self.size), self.backdrop)
         for worker in self.workers:
             check_samples(worker.scene.device, film, self.work, self.size)
         return film

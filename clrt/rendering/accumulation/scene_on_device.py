@@ -37,7 +37,7 @@ OTHER_PARAMETERS = 16
 
 def largest_film(device: Device, compiled: CompiledScene) -> int:
     """Return the maximum size of a film on the device, in bytes."""
-    pixel = compiled.choices.pixel.itemsize
+    pixel = compiled.pixel.itemsize
     if compiled.part_bytes is None:
         return device.info.max_alloc_bytes
     return part_records(pixel, compiled.part_bytes) * pixel

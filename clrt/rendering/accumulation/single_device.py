@@ -46,16 +46,16 @@ class SingleDeviceAccumulation(LocalAccumulation):
     ) -> None:
         size = plan.size
         super().__init__(size)
-        film_bytes = size[0] * size[1] * compiled.choices.pixel.itemsize
+        film_bytes = size[0] * size[1] * compiled.pixel.itemsize
         if film_bytes > largest_film(device, compiled):
             raise NoRoomError(
                 f"{device.info.name}: a film of {size[0]}x{size[1]} does not fit into a buffer; use a smaller --size"
             )
         self._scene = SceneOnDevice(device, compiled, plan.record(compiled), film_bytes, before=before)
-        self._copies = HostMemory(size[::-1], compiled.choices.pixel)  # everything else has been allocated
+        self._copies = HostMemory(size[::-1], compiled.pixel)  # everything else has been allocated
         self._launches = Launches(first_launch_samples(compiled), self._scene.most_work)
         with self._scene.allocating():
-            self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))
+            self._film = on_device(device, np.zeros(size[0] * size[1], compiled.pixel))
             self._tiles = _Tiles(device, np.zeros(1, np.uint32))
             self._scene.warm_up(self._film, self._tiles.buffer)
 
@@ -113,7 +113,7 @@ class SingleDeviceAccumulation(LocalAccumulation):
         with calling():
             copied = begin_copy(self.device, pixels, self._film)
         wait_for(copied)
-        film = Film(pixels)
+        film = Film(pixels, self.backdrop)
         check_samples(self.device, film, self.work, self.size)
         return film
 

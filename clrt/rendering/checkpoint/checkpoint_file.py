@@ -1,6 +1,6 @@
 """Checkpoint file: a header and arrays, with a checksum, in two generations.
 
-    clrt checkpoint 3\\n
+    clrt checkpoint 4\\n
     JSON in one line: {"header": …, "shapes": {name: [rows, columns …], …}}\\n
     the arrays' bytes, one after the other
     SHA-256 of all that, 32 bytes
@@ -30,7 +30,7 @@ from .direct_io import write_past_cache
 
 #: First bytes of checkpoints of any version.
 FAMILY = b"clrt checkpoint "
-MAGIC = FAMILY + b"3\n"
+MAGIC = FAMILY + b"4\n"
 #: Maximum header length in bytes, larger than any real header.
 LONGEST_HEADER = 1 << 16
 

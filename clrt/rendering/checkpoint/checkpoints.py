@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from ...errors import CheckpointError, OutputError, UsageError
 from ...scene.model import Scene
 from ...threads import beside
 from ..compile.choices import Choices
+from ..compile.film_record import film_features
 from .checkpoint_file import FAMILY, check_replaceable, older, read_checkpoint, write_checkpoint
 from .identity import differences, facts_of
 from .policy import CheckpointPolicy
@@ -82,8 +83,9 @@ class Checkpoints:
         end = time.perf_counter()
         self._next = end + max(self._every, COST * (end - start))
 
-    def read(self, size: tuple[int, int]) -> SavedState | None:
-        """Return the newest intact state, of an image of (width, height), or None if there is no checkpoint yet.
+    def read(self, size: tuple[int, int], features: Collection[str] = ()) -> SavedState | None:
+        """Return the newest intact state, of an image of (width, height) whose film stores what the features require,
+        or None if there is no checkpoint yet.
 
         Raises CheckpointError if it belongs to another render, or if no generation is intact.
         """
@@ -92,7 +94,7 @@ class Checkpoints:
             try:
                 header, arrays = read_checkpoint(path, KINDS)
                 self._check_facts(path, header)
-                kept = from_arrays(header, arrays, size)
+                kept = from_arrays(header, arrays, size, features)
             except FileNotFoundError:
                 continue
             except (OSError, ValueError) as error:
@@ -141,7 +143,7 @@ def open_checkpoints(
         return None, None
     checkpoints = Checkpoints(Path(policy.checkpoint), facts_of(scene, choices), device, policy.checkpoint_seconds)
     if policy.resume:
-        return checkpoints, checkpoints.read(scene.render.size)
+        return checkpoints, checkpoints.read(scene.render.size, film_features(scene, choices))
     checkpoints.warn_of_another()
     return checkpoints, None
 

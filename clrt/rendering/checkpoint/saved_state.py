@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..accumulation.work_queue import WorkPart, WorkQueue
-from ..compile.records import DIRECT, PIXEL, PIXEL_WITH_DIRECT
+from ..compile.film_record import PARTS, pixel_record
+from ..compile.records import PIXEL
 from ..error_estimate.error_estimate import NoiseEstimate
 from ..film.film import Film
 from ..film.tiles import tiles_of
@@ -16,9 +18,11 @@ from .checkpoint_file import Arrays
 
 #: Columns of a history, NaN for values that an entry lacks.
 HISTORY = ("spp", "seconds", "noise", "relmse")
+#: Arrays of the film's records, by their features.
+FILM_PARTS = {feature: feature.lower() for feature in PARTS}
 KINDS: dict[str, np.dtype[Any]] = {
     "film": PIXEL,
-    "direct": DIRECT,
+    **{name: PARTS[feature] for feature, name in FILM_PARTS.items()},
     "samples": np.dtype(np.int64),
     "then": np.dtype(np.int64),
     "tiles": np.dtype(np.uint32),
@@ -62,15 +66,16 @@ def to_arrays(kept: SavedState) -> Arrays:
     return {name: arrays[name].astype(kind, copy=False) for name, kind in KINDS.items()}
 
 
-def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -> SavedState:
-    """Return the saved state of an image of (width, height). Raises ValueError if the parts are inconsistent."""
+def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int], features: Collection[str]) -> SavedState:
+    """Return the saved state of an image of (width, height), whose film stores what these features require. Raises
+    ValueError if the parts are inconsistent."""
     planned, seconds = header.get("planned_spp"), header.get("seconds")
     if (
         not (planned is None or type(planned) is int and planned > 0)
         or type(seconds) is not float
         or not (
             0 <= seconds < np.inf
-            and _film_fits(header, arrays, size)
+            and _film_fits(arrays, size, features)
             and _work_fits(arrays, size)
             and _noise_fits(arrays, size)
         )
@@ -78,12 +83,10 @@ def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -
         raise ValueError(NO_SENSE)
     work = WorkQueue(arrays["samples"], arrays["then"], arrays["tiles"], map(WorkPart._make, arrays["parts"].tolist()))
     noise = NoiseEstimate(planned)
-    film = arrays["film"]
-    if arrays["direct"].size:
-        film = np.empty(film.shape, PIXEL_WITH_DIRECT)
-        for part in ("film", "direct"):
-            for name in arrays[part].dtype.names or ():
-                film[name] = arrays[part][name]
+    film = np.empty(arrays["film"].shape, pixel_record(features))
+    for part in ("film", *(FILM_PARTS[feature] for feature in features)):
+        for name in arrays[part].dtype.names or ():
+            film[name] = arrays[part][name]
     noise.restore(arrays["noise_mean"], arrays["noise_changes"], arrays["noise_level"])
     history = []
     for spp, second, error, relmse in arrays["history"].tolist():
@@ -93,16 +96,21 @@ def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -
 
 
 def _film_parts(film: Film) -> Arrays:
-    """Return its pixels without direct light, and the direct light separately, if the film has it."""
-    names = film.pixels.dtype.names or ()
-    direct = film.pixels[list(DIRECT.names or ())] if "direct" in names else np.zeros((0, 0), DIRECT)
-    return {"film": film.pixels[list(PIXEL.names or ())], "direct": direct}
+    """Return its records one by one, empty if the film does not have them."""
+    parts = {"film": film.pixels[list(PIXEL.names or ())]}
+    for feature, name in FILM_PARTS.items():
+        fields = list(PARTS[feature].names or ())
+        has = set(fields) <= set(film.pixels.dtype.names or ())
+        parts[name] = film.pixels[fields] if has else np.zeros((0, 0), PARTS[feature])
+    return parts
 
 
-def _film_fits(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -> bool:
-    """Return whether the film has this size, and stores direct light separately exactly if the render does."""
-    direct = size[::-1] if header["facts"].get("direct_light") == "True" else (0, 0)
-    return bool(arrays["film"].shape == size[::-1] and arrays["direct"].shape == direct)
+def _film_fits(arrays: Arrays, size: tuple[int, int], features: Collection[str]) -> bool:
+    """Return whether the film has this size, and exactly the records that these features require."""
+    wanted = {name: size[::-1] if feature in features else (0, 0) for feature, name in FILM_PARTS.items()}
+    return bool(
+        arrays["film"].shape == size[::-1] and all(arrays[name].shape == shape for name, shape in wanted.items())
+    )
 
 
 def _work_fits(arrays: Arrays, size: tuple[int, int]) -> bool:

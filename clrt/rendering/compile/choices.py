@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from ...accel.methods import TREELESS, BuilderName, HitTests, LayoutName
 from ...device.device_info import Paths
@@ -11,8 +11,6 @@ from ...errors import UsageError
 from ...option_fields import check_values, option
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from ...device.open import Device
 
 Lanes = Literal[1, 8, 16]
@@ -71,13 +69,6 @@ class Choices:
                 f"the layout {self.layout} is {'not ' * self.tree}a BVH, and tree is "
                 f"{'on' if self.tree else 'off'}; leave out one of them"
             )
-
-    @property
-    def pixel(self) -> np.dtype[Any]:
-        """Record type of a film pixel."""
-        from .records import PIXEL, PIXEL_WITH_DIRECT
-
-        return PIXEL_WITH_DIRECT if self.direct_light else PIXEL
 
     def on(self, device: Device | None) -> ResolvedChoices:
         """Return the choices with SIMD width and paths as they suit the device; without one, as they suit a CPU.

@@ -7,6 +7,7 @@ from functools import cached_property
 from math import inf
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from ...accel.layouts import Layout
@@ -22,6 +23,7 @@ from ..film.tiles import TILE_PIXELS
 from .choices import Choices, ResolvedChoices
 from .compile_ahead import begin_program
 from .features import WITH_LIGHT, features_of, files_for, preamble_of
+from .film_record import pixel_record
 from .geometry.pack_instances import ObjectIds
 from .pack_scene import pack_scene
 from .reuse_cache import ReuseCache
@@ -92,6 +94,11 @@ class CompiledScene:
         """Pixels per work-item of the entry's kernel."""
         whole = self.entry == WAVEFRONT or (self.entry == RASTER and self.choices.lanes > 1)
         return TILE_PIXELS if whole else self.choices.lanes
+
+    @property
+    def pixel(self) -> np.dtype[Any]:
+        """Record type of a film pixel."""
+        return pixel_record(self.features)
 
     @property
     def files(self) -> list[str]:

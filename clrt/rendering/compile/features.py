@@ -14,6 +14,7 @@ from ...scene.ray_list import RayList
 from ..film.tiles import TILE
 from .camera_kernel import camera_defines, camera_file
 from .choices import OFFSETS, Choices, ResolvedChoices
+from .film_record import film_features, pixel_record
 from .lights.light_types import SURFACES, TYPES
 from .pack_scene import PackedScene
 from .pixel_filters import filter_reach
@@ -46,6 +47,7 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
     features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
     features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
     features |= set().union(emitters.features, *(material.features() for material in packed.shapes.users))
+    features |= film_features(scene, choices)
     has = {
         **tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone, packed.tree is not NO_RAYS),
         "SPHERES": bool(scene.spheres),
@@ -69,10 +71,11 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
         "CAMERA_CULLING": (
             scene.render.back_face_culling == "camera" and any(user.is_culled for user in packed.shapes.users)
         ),
+        "CAMERA_HIDDEN": any(not user.camera_visible for user in packed.shapes.users),
         "CLAMP": bool(biased_by(scene.render)),
-        "DIRECT_LIGHT": choices.direct_light,
         "LOOP_LIMIT": loop_limit,
     }
+    has["CLEAR_GLASS"] = scene.render.transparent_glass and {"ALPHA", "TRANSMISSION"} <= features
     has["HORIZON"] = has["SMOOTH_NORMALS"] or has["NORMAL_MAPS"]
     # Shading hits by material, and misses apart, pays where microfacet materials are evaluated (measurements/gpu.md).
     has["SORT_HITS"] = choices.paths == "queues" and any(feature.startswith("SMITH_") for feature in features)
@@ -92,7 +95,7 @@ def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str
             defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(packed.tree), **unit}),
             defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
             defines({**{feature: 1 for feature in sorted(features)}, **camera_defines(packed.scene.camera)}),
-            typedefs({"Counts": COUNTS, "Pixel": choices.pixel, "Guide": GUIDE, "Launch": LAUNCH}),
+            typedefs({"Counts": COUNTS, "Pixel": pixel_record(features), "Guide": GUIDE, "Launch": LAUNCH}),
             scene_struct(packed.buffers, part_bytes),
             type_list("MATERIAL_TYPES", _numbered(materials.used)),
             type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),

@@ -112,7 +112,8 @@ LINEAR = np.dtype([("linear", "f4")])
 GUIDE = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
 #: If DIRECT_LIGHT is compiled in, a pixel also stores the sum of its samples' direct light.
 DIRECT = record(direct="3f4", pad0="u4", direct_error="3f4", pad1="u4")
-PIXEL_WITH_DIRECT = np.dtype([*PIXEL.descr, *DIRECT.descr])
+#: If ALPHA is, the sum of their coverage. A film's pixels have a multiple of 32 bytes.
+ALPHA = record(alpha="f4", alpha_error="f4", pad_alpha="6i4")
 #: A projected primitive (kernels/raster/outline.cl). edge0 … nearness: functions of the image position, or for a sphere
 #: its center and radius; instance: negative for spheres; rows: range of pixel rows that it may cover.
 OUTLINE = record(

@@ -35,10 +35,11 @@ def _padded(values: NDArray[np.float64], rows: tuple[int, int]) -> NDArray[np.fl
 
 
 class Film:
-    """Host copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT."""
+    """Host copy of the device's film. pixels: (height, width) records of a `pixel_record`; backdrop: (height, width, 3)
+    or (1, 1, 3), what is behind the scene, if that is part of the image; only if the film stores coverage."""
 
-    def __init__(self, pixels: NDArray[Any]) -> None:
-        self.pixels = pixels
+    def __init__(self, pixels: NDArray[Any], backdrop: NDArray[np.float32] | None = None) -> None:
+        self.pixels, self.backdrop = pixels, backdrop
         self._relative: tuple[NDArray[np.float32], NDArray[np.float64]] | None = None
 
     @property
@@ -49,8 +50,23 @@ class Film:
 
     @cached_property
     def mean(self) -> NDArray[np.float64]:
-        """(height, width, 3): mean of the accepted samples; 0 where there are none."""
+        """(height, width, 3): mean of the accepted samples, over the backdrop; 0 where there are none."""
         return self._mean_of("sum")
+
+    @cached_property
+    def alpha(self) -> NDArray[np.float64] | None:
+        """(height, width): fraction of each pixel that the scene covers; None if the film does not store it."""
+        if "alpha" not in (self.pixels.dtype.names or ()):
+            return None
+        alpha = np.empty(self.pixels.shape)
+
+        def fill(rows: slice) -> None:
+            pixels = self.pixels[rows]
+            total = pixels["alpha"].astype(np.float64) + pixels["alpha_error"]
+            alpha[rows] = np.clip(total / np.maximum(pixels["count"], 1), 0, 1)
+
+        in_bands(alpha.shape, fill)
+        return alpha
 
     @property
     def direct(self) -> NDArray[np.float64]:
@@ -69,11 +85,21 @@ class Film:
         return mean
 
     def _fill_with_mean(self, mean: NDArray[np.floating[Any]], name: str) -> None:
+        alpha = self.alpha
+
         def fill(rows: slice) -> None:
             pixels = self.pixels[rows]
             mean[rows] = _sums(pixels, name) / np.maximum(pixels["count"], 1)[..., None]
+            if alpha is not None and self.backdrop is not None:
+                mean[rows] += self._behind(rows, alpha)
 
         in_bands(mean.shape, fill)
+
+    def _behind(self, rows: slice, alpha: NDArray[np.float64], power: int = 1) -> NDArray[np.float64]:
+        """Return the light of the backdrop in the mean of these rows, or with a power of 2 in that of the squares."""
+        assert self.backdrop is not None
+        backdrop = self.backdrop if len(self.backdrop) == 1 else self.backdrop[rows]
+        return np.asarray((1 - alpha[rows])[..., None] * backdrop.astype(np.float64) ** power)
 
     @property
     def variance(self) -> NDArray[np.float64]:
@@ -87,6 +113,8 @@ class Film:
         count = pixels["count"].astype(np.float64)[..., None]
         with np.errstate(divide="ignore", invalid="ignore"):
             squares = _sums(pixels, "square") / count
+            if self.backdrop is not None and self.alpha is not None:  # a sample is covered or not, apart from glass
+                squares += self._behind(rows, self.alpha, 2)
             summed = squares >= (1 - 1e-6) * most  # also false for NaN
             variance = np.where(summed, np.maximum(squares - most, 0) / (count - 1), most)
         return np.where(count < 2, np.nan, variance)

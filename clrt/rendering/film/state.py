@@ -51,6 +51,13 @@ class State:
         """(height, width, 3) float32, linear Rec. 709."""
         return self.film.picture()
 
+    @cached_property
+    @with_default_errors
+    def alpha(self) -> NDArray[np.float32] | None:
+        """(height, width) float32, the fraction of each pixel that the scene covers: of a transparent image, for which
+        `pixels` are premultiplied, and of one with a backdrop; else None."""
+        return None if self.film.alpha is None else self.film.alpha.astype(np.float32)
+
 
 def check_reference(reference: object, size: tuple[int, int]) -> None:
     """Raise UsageError unless it is None, or comparable with an image of (width, height)."""

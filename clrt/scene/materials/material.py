@@ -34,6 +34,7 @@ class Material:
     - normal_map: perturbs the shading normal (glTF's convention: linear, x to the right and y up in the image); its
       factor scales x and y
     - opacity: the fraction of light that interacts with the surface; the rest passes straight through
+    - camera_visible: false for a surface that camera rays pass through, also where it emits; all others hit it
     - alpha_cutoff (alpha mask): the surface is opaque where the opacity reaches it, and absent elsewhere
     """
 
@@ -46,6 +47,7 @@ class Material:
     alpha_cutoff: Unit | None = None
     one_sided: bool = False
     double_sided: bool = False
+    camera_visible: bool = True
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
@@ -60,7 +62,8 @@ class Material:
     def surface_parameters(self, culling: Culling) -> dict[str, Parameter]:
         """Return the values of the fields above that surface kernels read, unless they are the defaults.
 
-        The kernels' one_sided is 1 if no ray hits the back face, 0.5 if no camera ray does.
+        The kernels' one_sided is 1 if no ray hits the back face, 0.5 if no camera ray does, and 2 more if camera rays
+        hit neither side.
         """
         parameters: dict[str, Parameter] = {}
         if self.normal_map is not None:
@@ -68,6 +71,7 @@ class Material:
         one_sided = 1.0 if self.one_sided or culling == "all" and self.is_culled else 0.0
         if culling == "camera" and self.is_culled:
             one_sided = max(one_sided, 0.5)
+        one_sided += 0.0 if self.camera_visible else 2.0
         if self.opacity != 1 or one_sided:
             cutoff = -1.0 if self.alpha_cutoff is None else self.alpha_cutoff
             # Not a field's name: materials without it get 0, and are opaque whatever the alpha of vertex colors.

@@ -15,7 +15,7 @@ from ..geometry.instancing import painted
 from ..light_images import LightImage
 from ..lights import LIGHTS
 from ..materials.material_types import MATERIALS, Diffuse, Material
-from ..model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere
+from ..model import Backdrop, Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere
 from .field_types import field_problems, show
 from .instance_problems import matrix_problems
 
@@ -52,7 +52,8 @@ def scene_problems(scene: Scene) -> list[str]:
         problems += _object_problems(animation, Animation, "animation") or (
             [] if problems else animation_problems(scene.camera, animation)
         )
-    problems += _environment_problems(scene.environment)
+    problems += _image_problems(scene.environment, Environment, "environment")
+    problems += [] if scene.backdrop is None else _image_problems(scene.backdrop, Backdrop, "backdrop")
     problems += _object_problems(scene.render, RenderSettings, "render") or _raster_problems(scene)
     users: list[tuple[str, Mesh | Sphere | Instance]] = []
     of_mesh: dict[int, list[str]] = {}  # by its id
@@ -268,11 +269,12 @@ def _raster_problems(scene: Scene) -> list[str]:
     ]
 
 
-def _environment_problems(environment: Environment) -> list[str]:
-    problems = _object_problems(environment, Environment, "environment")
-    if problems or environment.image is None:
+def _image_problems(value: Environment | Backdrop, wanted: type, where: str) -> list[str]:
+    """Return problems of an object with a color or an image."""
+    problems = _object_problems(value, wanted, where)
+    if problems or value.image is None:
         return problems
-    return _pixel_problems(environment.image, "environment.image")
+    return _pixel_problems(value.image, f"{where}.image")
 
 
 def _pixel_problems(image: object, where: str) -> list[str]:
