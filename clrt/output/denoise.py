@@ -126,9 +126,10 @@ def denoised_layers(
     if alpha is None:
         return denoiser(pixels, guides["albedo"], guides["normal"]), None
     behind = np.zeros((1, 1, 3), np.float32) if backdrop is None else backdrop
-    scene = denoiser(pixels - (1 - alpha[..., None]) * behind, guides["albedo"], guides["normal"])
+    raw = pixels - (1 - alpha[..., None]) * behind
+    scene = denoiser(raw, guides["albedo"], guides["normal"])
     smooth = denoiser.coverage(alpha, guides["albedo"], guides["normal"])
-    empty = (smooth == 0)[..., None]
+    empty = ((smooth == 0) & ~raw.any(axis=2))[..., None]
     return np.where(empty, 0, scene) + (1 - smooth[..., None]) * behind, smooth
 
 

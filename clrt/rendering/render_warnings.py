@@ -67,6 +67,10 @@ class PictureWarnings:
         ]
         if _shows_light(scene.render) and _is_dark(self._features):
             self._of_scene.append("the image is black: nothing in this scene emits light")
+        if "CATCHER" in self._features and not scene.render.transparent and scene.backdrop is None:
+            self._of_scene.append(
+                "what catchers catch is not visible on black; add transparent = true to [render], or a [backdrop]"
+            )
         for text in self._of_scene:
             _log.warning("%s: %s", scene.name, text)
 

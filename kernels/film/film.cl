@@ -21,6 +21,10 @@ typedef struct {
 #if ALPHA
     real alpha, alpha_error;      // coverage of the same samples
 #endif
+#if CATCHER
+    real3 caught, caught_error, bare, bare_error;   // light of those of catchers, with and without the objects
+    real catcher, catcher_error;                    // the number of those
+#endif
 } Accumulator;
 
 static inline void two_sum(real *sum, real *error, real x) {
@@ -64,6 +68,26 @@ static inline void accumulate_alpha(Accumulator *a, real alpha, ireal kept) {
 }
 #endif
 
+#if CATCHER
+static inline void accumulate_caught(Accumulator *a, real3 sample, ireal caught) {
+    real3 L = choose(caught, sample, splat(ZERO));
+    two_sum(&a->caught.x, &a->caught_error.x, L.x);
+    two_sum(&a->caught.y, &a->caught_error.y, L.y);
+    two_sum(&a->caught.z, &a->caught_error.z, L.z);
+    two_sum(&a->catcher, &a->catcher_error, caught ? ONE : ZERO);
+}
+
+// Add the light of a sample without the objects, which is not counted as one.
+static inline void accumulate_bare(Accumulator *a, real3 sample, ireal counted) {
+    real3 size = absolute3(sample);
+    ireal finite = (size.x <= BRIGHTEST) & (size.y <= BRIGHTEST) & (size.z <= BRIGHTEST);
+    real3 L = choose(counted & finite, sample, splat(ZERO));
+    two_sum(&a->bare.x, &a->bare_error.x, L.x);
+    two_sum(&a->bare.y, &a->bare_error.y, L.y);
+    two_sum(&a->bare.z, &a->bare_error.z, L.z);
+}
+#endif
+
 static inline Accumulator load_pixels(global const Pixel *pixels, ireal pixel) {
     WHOLE(Pixel, film, pixels);
     return (Accumulator){GATHER3(film, pixel, .sum), GATHER3(film, pixel, .sum_error), GATHER3(film, pixel, .square),
@@ -77,6 +101,11 @@ static inline Accumulator load_pixels(global const Pixel *pixels, ireal pixel) {
 #endif
 #if ALPHA
                          GATHER(real, film, pixel, .alpha), GATHER(real, film, pixel, .alpha_error),
+#endif
+#if CATCHER
+                         GATHER3(film, pixel, .caught), GATHER3(film, pixel, .caught_error),
+                         GATHER3(film, pixel, .bare), GATHER3(film, pixel, .bare_error),
+                         GATHER(real, film, pixel, .catcher), GATHER(real, film, pixel, .catcher_error),
 #endif
     };
 }
@@ -110,6 +139,14 @@ static inline void store_pixels(global Pixel *film, ureal index, ireal stored, c
 #if ALPHA
         pixel->alpha = LANE(a->alpha, lane);
         pixel->alpha_error = LANE(a->alpha_error, lane);
+#endif
+#if CATCHER
+        store_rows(pixel->caught, &a->caught, lane);
+        store_rows(pixel->caught_error, &a->caught_error, lane);
+        store_rows(pixel->bare, &a->bare, lane);
+        store_rows(pixel->bare_error, &a->bare_error, lane);
+        pixel->catcher = LANE(a->catcher, lane);
+        pixel->catcher_error = LANE(a->catcher_error, lane);
 #endif
     }
 }

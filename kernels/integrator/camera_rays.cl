@@ -29,6 +29,17 @@ typedef struct { real3 origin, direction; } CameraRay;   // direction: unit
 #define ALPHA_ARGUMENT(alpha)
 #endif
 
+// Whether a catcher was seen, and the scene of a launch (surface/catcher.cl).
+#if CATCHER
+#define CATCHER_PARAMETER , ireal *caught
+#define CATCHER_ARGUMENT(caught) , caught
+#define CHOOSE_WORLD(scene, launch) (scene).bare = (launch).bare;
+#else
+#define CATCHER_PARAMETER
+#define CATCHER_ARGUMENT(caught)
+#define CHOOSE_WORLD(scene, launch)
+#endif
+
 // The pixels of a work-item's lanes: LANES pixels of a tile of TILE x TILE. A launch covers pixels from first_pixel
 // on, in the order of `tiles`, row by row within each tile. A lane outside the image gets the pixel of the first lane
 // and is not `inside`.

@@ -3,11 +3,12 @@
 //
 // INTEGRATOR provides
 //
-//   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct, &removed ALPHA_ARGUMENT(&alpha))
+//   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct, &removed ALPHA_ARGUMENT(&alpha)
+//              CATCHER_ARGUMENT(&caught))
 //                                         radiance along the camera rays, 0 in inactive lanes; adds the number of rays
 //                                         traced to `rays`; sets `direct` if DIRECT_LIGHT is compiled in; adds the
 //                                         energy removed by clamping to `removed` if CLAMP is, and the coverage to
-//                                         `alpha` if ALPHA is
+//                                         `alpha` if ALPHA is; sets `caught` if CATCHER is
 //
 // PIXEL_MIDDLE: all samples use the ray through the pixel centre.
 #include "integrator/camera_rays.cl"
@@ -17,6 +18,7 @@
 __attribute__((vec_type_hint(real)))
 kernel void megakernel(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles, const Launch launch) {
     Scene scene = SCENE_ARGUMENTS;
+    CHOOSE_WORLD(scene, launch)
     LanePixels own;
     if (!lane_pixels(&launch, tiles, &own)) return;
     Accumulator pixels = load_pixels(film, AS_INT(own.index));
@@ -34,8 +36,17 @@ kernel void megakernel(SCENE_PARAMETERS, global Pixel *film, global const uint *
 #if ALPHA
         real alpha = ZERO;
 #endif
+#if CATCHER
+        ireal caught = NO_LANES;
+#endif
         real3 seen = seen_along(&scene, &launch, &ray, active, &sampler, &pixels.rays, &direct, &removed
-                                ALPHA_ARGUMENT(&alpha));
+                                ALPHA_ARGUMENT(&alpha) CATCHER_ARGUMENT(&caught));
+#if CATCHER
+        if (launch.bare) {
+            accumulate_bare(&pixels, seen, own.inside);
+            continue;
+        }
+#endif
         ireal kept = accumulate(&pixels, seen, own.inside);
 #if CLAMP
         pixels.clamped += kept ? removed : ZERO;
@@ -45,6 +56,9 @@ kernel void megakernel(SCENE_PARAMETERS, global Pixel *film, global const uint *
 #endif
 #if ALPHA
         accumulate_alpha(&pixels, alpha, kept);
+#endif
+#if CATCHER
+        accumulate_caught(&pixels, seen, kept & caught);
 #endif
     }
     store_pixels(film, own.index, own.inside, &pixels);

@@ -103,6 +103,13 @@ static inline real coverage(const Path *path, int depth, ireal hit, ireal escape
 #endif
 }
 
+// The lanes, of those that hit something at depth 1, where that is not a catcher.
+#if CATCHER
+#define COVERING(hit, caught) (hit) & !(caught)
+#else
+#define COVERING(hit, caught) hit
+#endif
+
 // The lanes, of those that escape, that the environment lights.
 #define LIT(path, depth, escaped) ((escaped) & !sees_through(path, depth))
 #else

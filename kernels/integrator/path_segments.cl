@@ -4,7 +4,8 @@
 
 // The light that a path brings from its segment `depth` on, 1 being the camera ray.
 static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path *path, int depth, ireal active,
-                                  Sampler *sampler, ureal *rays, real3 *direct, real *removed ALPHA_PARAMETER) {
+                                  Sampler *sampler, ureal *rays, real3 *direct, real *removed ALPHA_PARAMETER
+                                  CATCHER_PARAMETER) {
     real3 L = splat(ZERO);
     for (;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
@@ -12,6 +13,13 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
         Surface surface;
         Hits hits = first_surface(scene, path->origin, path->wi, depth == 1, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
+#if CATCHER
+        if (depth == 1) {
+            *caught = hit & is_catcher(scene, &surface);
+            active = launch->bare ? *caught : active;
+            hit = hit & active;
+        }
+#endif
         absorb(path, hit ? hits.t : (real)(INFINITY));
         L = add(L, clamped(launch, emitted_light(scene, path, &surface, hits.t, hit), depth, removed));
         L = add(L, clamped(launch, escaped_light(scene, path, LIT(path, depth, active & !hit)), depth, removed));
@@ -19,7 +27,7 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
         if (depth <= 2) *direct = L;
 #endif
 #if ALPHA
-        *alpha += coverage(path, depth, hit, active & !hit);
+        *alpha += coverage(path, depth, COVERING(hit, *caught), active & !hit);
 #endif
         active = hit;
         if (depth >= launch->max_depth || !ANY(active)) return L;

@@ -170,8 +170,8 @@ static inline ShadowRay load_shadow(const Queues *q, uint place, uint *slot) {
 }
 #endif
 
-// The light of a slot: three rows of one word, three of its direct light, one of the energy removed by clamping, and one
-// of its coverage.
+// The light of a slot: three rows of one word, three of its direct light, one of the energy removed by clamping, one of
+// its coverage, and one that is 1 if the camera sees a catcher.
 #define DIRECT_ROW 3
 #if DIRECT_LIGHT
 #define REMOVED_ROW 6
@@ -184,9 +184,14 @@ static inline ShadowRay load_shadow(const Queues *q, uint place, uint *slot) {
 #define ALPHA_ROW REMOVED_ROW
 #endif
 #if ALPHA
-#define LIGHT_ROWS (ALPHA_ROW + 1)
+#define CAUGHT_ROW (ALPHA_ROW + 1)
 #else
-#define LIGHT_ROWS ALPHA_ROW
+#define CAUGHT_ROW ALPHA_ROW
+#endif
+#if CATCHER
+#define LIGHT_ROWS (CAUGHT_ROW + 1)
+#else
+#define LIGHT_ROWS CAUGHT_ROW
 #endif
 
 static inline real3 slot_light(const Queues *q, uint slot, uint row) {

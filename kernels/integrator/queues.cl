@@ -53,6 +53,7 @@ kernel void generate(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tile
 // Stage 2: intersect the path segments with the scene.
 kernel void extend(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, const Launch launch, const int depth) {
     Scene scene = SCENE_ARGUMENTS;
+    CHOOSE_WORLD(scene, launch)
     const Queues q = QUEUE_ARGUMENTS;
     EACH_IN_QUEUE(i, *queued_paths(&q, depth)) {
         global float4 *row = path_rows(&q, depth, i);
@@ -86,9 +87,14 @@ static inline void shade_hit(const Scene *scene, const Queues *q, const Launch *
                              int depth, const Hits *hits, Shaded *shaded) {
     Path *path = &shaded->travel.path;
     Surface surface = surface_at(scene, path->origin, path->wi, hits);
+#if CATCHER
+    bool caught = depth == 1 && is_catcher(scene, &surface);
+    if (caught) q->light[shaded->travel.slot + CAUGHT_ROW * q->capacity] = 1.0f;
+    else if (depth == 1 && launch->bare) return;
+#endif
     absorb(path, hits->t);
 #if ALPHA
-    q->light[shaded->travel.slot + ALPHA_ROW * q->capacity] += coverage(path, depth, true, false);
+    q->light[shaded->travel.slot + ALPHA_ROW * q->capacity] += coverage(path, depth, COVERING(true, caught), false);
 #endif
     add_light(q, launch, shaded->travel.slot, emitted_light(scene, path, &surface, hits->t, true), depth);
     if (depth >= launch->max_depth) return;
@@ -111,6 +117,7 @@ static inline void shade_hit(const Scene *scene, const Queues *q, const Launch *
 kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, const Launch launch, const int depth) {
     local uint group[2];
     Scene scene = SCENE_ARGUMENTS;
+    CHOOSE_WORLD(scene, launch)
     const Queues q = QUEUE_ARGUMENTS;
     uint blocks = block_count(&q, depth);
     for (uint block = get_group_id(0); block < blocks; block += get_num_groups(0)) {
@@ -152,6 +159,7 @@ kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, 
 // Stage 5: trace the shadow rays and add the light of those that are unoccluded.
 kernel void connect(SCENE_PARAMETERS, QUEUE_PARAMETERS, const Launch launch, const int depth) {
     Scene scene = SCENE_ARGUMENTS;
+    CHOOSE_WORLD(scene, launch)
     const Queues q = QUEUE_ARGUMENTS;
     EACH_IN_QUEUE(i, *queued_shadows(&q, depth)) {
         uint slot;
@@ -170,6 +178,13 @@ kernel void update_film(QUEUE_PARAMETERS, global Pixel *film, global const uint 
     Accumulator pixel = load_pixels(film, own.index);
     for (uint s = 0; s < launch.sample_count; ++s) {
         uint slot = s * launch.pixel_count + (uint)get_global_id(0);
+#if CATCHER
+        if (launch.bare) {
+            accumulate_bare(&pixel, slot_light(&q, slot, 0), true);
+            pixel.rays += q.rays[slot];
+            continue;
+        }
+#endif
         ireal kept = accumulate(&pixel, slot_light(&q, slot, 0), true);
         pixel.rays += q.rays[slot];
 #if DIRECT_LIGHT
@@ -180,6 +195,9 @@ kernel void update_film(QUEUE_PARAMETERS, global Pixel *film, global const uint 
 #endif
 #if ALPHA
         accumulate_alpha(&pixel, q.light[slot + ALPHA_ROW * q.capacity], kept);
+#endif
+#if CATCHER
+        accumulate_caught(&pixel, slot_light(&q, slot, 0), kept & (q.light[slot + CAUGHT_ROW * q.capacity] > 0.0f));
 #endif
     }
     store_pixels(film, own.index, true, &pixel);

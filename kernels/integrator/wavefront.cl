@@ -44,6 +44,9 @@ typedef struct {
 #if ALPHA
     float alpha[WAVE];                   // coverage
 #endif
+#if CATCHER
+    float caught[WAVE];                  // 1 where the camera sees a catcher
+#endif
     const Launch *launch;
     uint x, y, sample;                   // of slot 0
     uint dimension, rays;
@@ -80,11 +83,11 @@ static inline void add_light(Wave *w, ureal slot, real3 found, int edges) {
 }
 
 #if ALPHA
-// Add to the coverage of the slots of some lanes.
-static inline void add_coverage(Wave *w, ureal slot, real found, ireal some) {
+// Add values of some lanes to those of their slots.
+static inline void add_to_slots(float *row, ureal slot, real found, ireal some) {
     for (uint bits = mask_bits(some); bits; bits &= bits - 1) {
         int lane = first_bit(bits);
-        w->alpha[LANE_UINT(slot, lane)] += LANE(found, lane);
+        row[LANE_UINT(slot, lane)] += LANE(found, lane);
     }
 }
 #endif
@@ -112,6 +115,9 @@ __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int sl
 #endif
 #if ALPHA
         vstore8(ZERO, 0, w->alpha + i);
+#endif
+#if CATCHER
+        vstore8(ZERO, 0, w->caught + i);
 #endif
         dimension = sampler.dimension;
     }
@@ -148,9 +154,6 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
         Arrival a;
         LOAD(a, w->arrivals, i)
         ireal active = lanes_of(i, count), hit = active & (a.hits.primitive >= 0), missed = active & !hit;
-#if ALPHA
-        if (depth == 1) add_coverage(w, a.travel.slot, coverage(&a.travel.path, depth, hit, missed), hit);
-#endif
 #if ENVIRONMENT || CLEAR_GLASS
         if (ANY(missed)) PACK(a.travel, missed, w->escapes, escaped)
 #endif
@@ -165,7 +168,7 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
         add_light(w, travel.slot, escaped_light(scene, &travel.path, LIT(&travel.path, depth, lanes_of(i, escaped))), depth);
 #if CLEAR_GLASS
         ireal passed = lanes_of(i, escaped);
-        if (depth > 1) add_coverage(w, travel.slot, coverage(&travel.path, depth, !passed, passed), passed);
+        if (depth > 1) add_to_slots(w->alpha, travel.slot, coverage(&travel.path, depth, !passed, passed), passed);
 #endif
     }
     return arrived;
@@ -184,6 +187,16 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
         ireal active = lanes_of(i, count);
         a.hits.primitive = active ? a.hits.primitive : (ireal)(-1);
         Surface surface = surface_at(scene, path->origin, path->wi, &a.hits);
+#if CATCHER
+        if (depth == 1) {
+            ireal caught = active & is_catcher(scene, &surface);
+            add_to_slots(w->caught, a.travel.slot, ONE, caught);
+            active = scene->bare ? caught : active;
+            add_to_slots(w->alpha, a.travel.slot, ONE, active & !caught);
+        }
+#elif ALPHA
+        if (depth == 1) add_to_slots(w->alpha, a.travel.slot, ONE, active);
+#endif
         absorb(path, a.hits.t);
         add_light(w, a.travel.slot, emitted_light(scene, path, &surface, a.hits.t, active), depth);
         if (depth >= w->launch->max_depth) continue;
@@ -247,6 +260,12 @@ static inline void add_samples(const Wave *w, global Pixel *film, uint first_pix
         Accumulator pixels = load_pixels(film, AS_INT(index));
         pixels.rays += slot == 0 ? (ureal)(w->rays) : (ureal)(0);
         for (int first = i; first < slots; first += TILE_PIXELS) {
+#if CATCHER
+            if (w->launch->bare) {
+                accumulate_bare(&pixels, slots_light(w->light, first), inside);
+                continue;
+            }
+#endif
             ireal kept = accumulate(&pixels, slots_light(w->light, first), inside);
 #if DIRECT_LIGHT
             accumulate_direct(&pixels, slots_light(w->direct, first), kept);
@@ -257,6 +276,9 @@ static inline void add_samples(const Wave *w, global Pixel *film, uint first_pix
 #if ALPHA
             accumulate_alpha(&pixels, vload8(0, w->alpha + first), kept);
 #endif
+#if CATCHER
+            accumulate_caught(&pixels, slots_light(w->light, first), kept & (vload8(0, w->caught + first) > 0.0f));
+#endif
         }
         store_pixels(film, index, inside, &pixels);
     }
@@ -265,6 +287,7 @@ static inline void add_samples(const Wave *w, global Pixel *film, uint first_pix
 __attribute__((vec_type_hint(real)))
 kernel void wavefront(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles, const Launch launch) {
     Scene scene = SCENE_ARGUMENTS;
+    CHOOSE_WORLD(scene, launch)
     uint first = (uint)get_global_id(0) * TILE_PIXELS;
     if (first >= launch.pixel_count) return;
     uint across = (launch.width + TILE - 1) / TILE, tile = tiles[(first + launch.first_pixel) / TILE_PIXELS];

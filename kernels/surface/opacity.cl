@@ -1,5 +1,6 @@
 // Surface opacity; OPACITY_TYPES lists the material types of which some are not opaque.
 #include "bsdf/interface.cl"
+#include CATCHER_FILE
 
 #if CAMERA_CULLING
 #define ONE_SIDED(value) ((value) >= (from_camera ? 0.5f : 1.0f))   // see Material.surface_parameters
@@ -34,6 +35,9 @@ static inline real opacity_at(const Scene *scene, const Surface *surface, real3 
     OPACITY_TYPES(OPACITY_OF)
 #if VERTEX_COLORS
     opacity *= surface->tint_opacity;
+#endif
+#if CATCHER
+    if (scene->bare && !from_camera) visible = visible & is_bare(scene, surface);
 #endif
     opacity = cutoff < 0.0f ? opacity : (opacity < cutoff ? ZERO : ONE);
     return visible ? opacity : ZERO;

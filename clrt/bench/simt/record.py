@@ -26,7 +26,7 @@ from ...rendering.compile.camera_kernel import launch_record
 from ...rendering.compile.choices import Choices
 from ...rendering.compile.compile_scene import KERNELS, MEGAKERNEL
 from ...rendering.compile.features import WITH_LIGHT, features_of, files_for, preamble_of
-from ...rendering.compile.film_record import film_features, pixel_record
+from ...rendering.compile.film_record import pixel_record
 from ...rendering.compile.pack_scene import PackedScene, pack_scene
 from ...rendering.compile.reuse_cache import ReuseCache
 from ...rendering.film.tiles import TILE_PIXELS
@@ -109,7 +109,7 @@ class PathRecorder:
         launch["pixel_count"], launch["sample_count"], launch["block_bits"] = pixels, 1, block_bits(1)
         launch["clamp_direct"] = launch["clamp_indirect"] = np.inf
         scene = {name: resident(device, array) for name, (_, array) in packed.buffers.items()}
-        pixel = pixel_record(film_features(self.packed.scene, self._choices))
+        pixel = pixel_record(self.packed.film)
         film = resident(device, np.zeros(self._size[0] * self._size[1], pixel))
         chosen = resident(device, tiles)
         kernel = make_kernel(device, self._program, KERNELS[MEGAKERNEL])

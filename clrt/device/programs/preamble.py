@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,12 @@ from .struct_types import c_typedef
 Buffers = Mapping[str, tuple[str, Any]]
 
 
-def scene_struct(buffers: Buffers, part_bytes: int | None = None) -> str:
+def scene_struct(buffers: Buffers, part_bytes: int | None = None, others: Sequence[str] = ()) -> str:
     """Return the struct `Scene`, its kernel parameters (SCENE_PARAMETERS) and its initialiser (SCENE_ARGUMENTS).
 
     The order of `buffers` is the order of the kernel's arguments; the counts come last. part_bytes: maximum size of the
-    parts that all buffers are split into (kernels/core/arrays.cl), None for whole buffers.
+    parts that all buffers are split into (kernels/core/arrays.cl), None for whole buffers. others: further members of
+    the struct, 0 unless a kernel sets them.
     """
     typedefs = {c_type: c_typedef(c_type, array.dtype) for c_type, array in buffers.values()}
     members = [f"global const {c_type} *{name}" for name, (c_type, _) in buffers.items()]
@@ -34,7 +35,7 @@ def scene_struct(buffers: Buffers, part_bytes: int | None = None) -> str:
     return "\n".join(
         [
             *lines,
-            f"typedef struct {{ {' '.join(member + ';' for member in [*members, 'Counts counts'])} }} Scene;",
+            f"typedef struct {{ {' '.join(member + ';' for member in [*members, 'Counts counts', *others])} }} Scene;",
             f"#define SCENE_PARAMETERS {', '.join([*parameters, 'const Counts counts'])}",
             f"#define SCENE_ARGUMENTS {{{', '.join([*names, 'counts'])}}}",
         ]

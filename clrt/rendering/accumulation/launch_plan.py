@@ -11,6 +11,7 @@ from ...accel.methods import TREELESS
 from ...scene.model import RenderSettings
 from ..compile.camera_kernel import launch_record
 from ..compile.compile_scene import CompiledScene
+from ..compile.film_record import launch_type
 
 #: Minimum number of tiles per launch.
 FEWEST_TILES = 16
@@ -38,7 +39,7 @@ class LaunchPlan:
 
     def record(self, compiled: CompiledScene) -> NDArray[Any]:
         """Return the LAUNCH record of a scene's image, without a range of pixels and samples."""
-        launch = launch_record(compiled.camera, self.size)
+        launch = launch_record(compiled.camera, self.size, launch_type(compiled.features))
         launch["max_depth"], launch["seed"], launch["block_bits"] = (
             self.max_depth,
             self.seed,

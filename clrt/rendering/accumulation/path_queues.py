@@ -28,7 +28,7 @@ PATH_ROWS, SHADOW_ROWS, LIGHT_WORDS = 5, 4, 3
 
 def slot_bytes(compiled: CompiledScene) -> dict[str, int]:
     """Return the bytes of a slot in each buffer, in the order of QUEUE_PARAMETERS."""
-    names = "ATTENUATION", "INSTANCES", "LIGHTS", "DIRECT_LIGHT", "CLAMP", "ALPHA"
+    names = "ATTENUATION", "INSTANCES", "LIGHTS", "DIRECT_LIGHT", "CLAMP", "ALPHA", "CATCHER"
     has = {name: name in compiled.features for name in names}
     return {
         "paths": 2 * (PATH_ROWS + has["ATTENUATION"]) * ROW,
@@ -36,7 +36,7 @@ def slot_bytes(compiled: CompiledScene) -> dict[str, int]:
         "instances": has["INSTANCES"] * WORD,
         "order": kind_count(compiled) * WORD,
         "shadows": has["LIGHTS"] * SHADOW_ROWS * ROW,
-        "light": (LIGHT_WORDS * (1 + has["DIRECT_LIGHT"]) + has["CLAMP"] + has["ALPHA"]) * WORD,
+        "light": (LIGHT_WORDS * (1 + has["DIRECT_LIGHT"]) + has["CLAMP"] + has["ALPHA"] + has["CATCHER"]) * WORD,
         "rays": WORD,
     }
 

@@ -157,7 +157,16 @@ class SceneOnDevice:
         self.build_seconds += time.perf_counter() - start
 
     def enqueue_pixels(self, film: cl.Buffer, tiles: cl.Buffer) -> LaunchEvents:
-        """Enqueue the integrator for the range in the launch record, of the image's tiles in `tiles`."""
+        """Enqueue the integrator for the range in the launch record, of the image's tiles in `tiles`; of a scene with
+        catchers once with its objects and once without."""
+        if "bare" not in (self.launch.dtype.names or ()):
+            return self._enqueue_world(film, tiles)
+        worlds = []
+        for self.launch["bare"] in (0, 1):
+            worlds.append(self._enqueue_world(film, tiles))
+        return LaunchEvents(worlds[0].first, worlds[-1].last)
+
+    def _enqueue_world(self, film: cl.Buffer, tiles: cl.Buffer) -> LaunchEvents:
         if self._queues:
             with self.allocating():
                 return self._queues.enqueue(film, tiles, self.launch)

@@ -39,8 +39,8 @@ def camera_defines(camera: Camera) -> dict[str, int]:
     return {"REPLICAS": REPLICAS} if isinstance(camera, RayList) else {}
 
 
-def launch_record(camera: Camera, size: tuple[int, int]) -> NDArray[Any]:
-    """Return a LAUNCH record with camera and size. The camera's kernel file defines right, up and forward."""
+def launch_record(camera: Camera, size: tuple[int, int], kind: np.dtype[Any] = LAUNCH) -> NDArray[Any]:
+    """Return a launch record of a kind with camera and size. The camera's kernel file defines right, up and forward."""
     width, height = size
     forward = np.subtract(camera.look_at, camera.position, dtype=np.float64)
     distance = np.linalg.norm(forward)
@@ -48,7 +48,7 @@ def launch_record(camera: Camera, size: tuple[int, int]) -> NDArray[Any]:
     right = np.cross(forward, np.asarray(camera.up, np.float64))
     right /= np.linalg.norm(right)
     view = View(right, np.cross(right, forward), forward, float(distance), width, height)
-    record = np.zeros(1, LAUNCH)
+    record = np.zeros(1, kind)
     record["position"], record["lens_radius"] = camera.position, camera.aperture_radius
     record["right"], record["up"], record["forward"] = camera.type.axes(camera, view)
     record["width"], record["height"] = width, height

@@ -14,11 +14,11 @@ from ...scene.ray_list import RayList
 from ..film.tiles import TILE
 from .camera_kernel import camera_defines, camera_file
 from .choices import OFFSETS, Choices, ResolvedChoices
-from .film_record import film_features, pixel_record
+from .film_record import launch_type, pixel_record
 from .lights.light_types import SURFACES, TYPES
 from .pack_scene import PackedScene
 from .pixel_filters import filter_reach
-from .records import COUNTS, GUIDE, LAUNCH, OUTLINE
+from .records import COUNTS, GUIDE, OUTLINE
 
 #: Path-tracing integrators, and the kernel files of the integrators that compute light; others show first hits
 #: (kernels/integrator/first_surface.cl).
@@ -47,7 +47,7 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
     features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
     features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
     features |= set().union(emitters.features, *(material.features() for material in packed.shapes.users))
-    features |= film_features(scene, choices)
+    features |= packed.film
     has = {
         **tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone, packed.tree is not NO_RAYS),
         "SPHERES": bool(scene.spheres),
@@ -57,8 +57,8 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
         "TEXTURES": packed.uv_sets > 0,
         "NORMAL_MAPS": materials.normal_maps,
         "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in packed.shapes.users),
-        "OPACITY": bool(materials.with_value("opacity")),
-        "NEXT_HIT": bool(materials.with_value("opacity")),
+        "OPACITY": bool(materials.with_value("opacity")) or "CATCHER" in features,
+        "NEXT_HIT": bool(materials.with_value("opacity")) or "CATCHER" in features,
         "SKY": packed.sky.kernel is not None,
         "LIGHTS": emitters.count > 0,
         "LIGHT_TREE": emitters.choice.tree,
@@ -90,13 +90,15 @@ def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str
     unit = {"SCENE_UNIT": packed.frame.unit} if lengths else {}
     surfaces = [t for t in emitters.types if t in SURFACES]
     rasterised = [typedefs({"Outline": OUTLINE}), defines({"FILTER_REACH": filter_reach(packed.scene.render.filter)})]
+    catching = [type_list("CATCHER_TYPES", _numbered(materials.with_value("catcher")))]
+    launch = launch_type(features)
     return "\n".join(
         [
             defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(packed.tree), **unit}),
             defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
             defines({**{feature: 1 for feature in sorted(features)}, **camera_defines(packed.scene.camera)}),
-            typedefs({"Counts": COUNTS, "Pixel": pixel_record(features), "Guide": GUIDE, "Launch": LAUNCH}),
-            scene_struct(packed.buffers, part_bytes),
+            typedefs({"Counts": COUNTS, "Pixel": pixel_record(features), "Guide": GUIDE, "Launch": launch}),
+            scene_struct(packed.buffers, part_bytes, ["int bare"] if "CATCHER" in features else []),
             type_list("MATERIAL_TYPES", _numbered(materials.used)),
             type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),
             type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),
@@ -109,6 +111,7 @@ def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str
             type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),
             type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces]),
             *(rasterised if "RASTER" in features else []),
+            *(catching if "CATCHER" in features else []),
         ]
     )
 
@@ -137,6 +140,7 @@ def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict
         "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else []),
         "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
         "OPACITY_FILE": ["surface/opacity.cl"] if "OPACITY" in features else [],
+        "CATCHER_FILE": ["surface/catcher.cl"] if "CATCHER" in features else [],
         "TEXTURE_FILES": ["surface/texture.cl"] if packed.uv_sets else [],
         "NORMAL_MAPS_FILE": ["surface/normal_maps.cl"] if packed.materials.normal_maps else [],
         "HORIZON_FILE": ["surface/horizon.cl"] if "HORIZON" in features else [],

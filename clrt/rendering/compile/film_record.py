@@ -8,16 +8,21 @@ from typing import Any
 import numpy as np
 
 from ...scene.model import Scene
+from ..film.backdrop import catches, sees_environment
 from .choices import Choices
-from .records import ALPHA, DIRECT, PIXEL
+from .records import ALPHA, CATCHER, DIRECT, LAUNCH, LAUNCH_OF_CATCHERS, PIXEL
 
 #: Records that follow PIXEL in a film, by the feature that is compiled in with them.
-PARTS = {"DIRECT_LIGHT": DIRECT, "ALPHA": ALPHA}
+PARTS = {"DIRECT_LIGHT": DIRECT, "ALPHA": ALPHA, "CATCHER": CATCHER}
 
 
 def film_features(scene: Scene, choices: Choices) -> set[str]:
     """Return the features that have a record in PARTS."""
-    has = {"DIRECT_LIGHT": choices.direct_light, "ALPHA": hides_environment(scene)}
+    has = {
+        "DIRECT_LIGHT": choices.direct_light,
+        "ALPHA": not sees_environment(scene),
+        "CATCHER": catches(scene),
+    }
     return {name for name, present in has.items() if present}
 
 
@@ -26,6 +31,6 @@ def pixel_record(features: Collection[str]) -> np.dtype[Any]:
     return np.dtype([*PIXEL.descr, *(field for name in PARTS if name in features for field in PARTS[name].descr)])
 
 
-def hides_environment(scene: Scene) -> bool:
-    """Return whether the camera does not see the environment behind the scene."""
-    return scene.render.transparent or scene.backdrop is not None or not scene.environment.camera_visible
+def launch_type(features: Collection[str]) -> np.dtype[Any]:
+    """Return the record of a launch of a program with these features."""
+    return LAUNCH_OF_CATCHERS if "CATCHER" in features else LAUNCH

@@ -21,6 +21,7 @@ from ...scene.model import Scene
 from ...threads import beside
 from .camera_kernel import camera_buffers
 from .choices import Choices
+from .film_record import film_features
 from .geometry.pack_geometry import TriangleCorners, normal_records, sphere_records, triangle_records
 from .geometry.pack_instances import ObjectIds, PackedInstances
 from .geometry.vertex_attributes import pack_corners
@@ -112,7 +113,8 @@ class Shapes:
 
 @dataclass(frozen=True)
 class PackedScene:
-    """Packed scene, without its program. counts: a COUNTS record; uv_sets: number of UV sets that its textures use."""
+    """Packed scene, without its program. counts: a COUNTS record; uv_sets: number of UV sets that its textures use;
+    film: what its film stores (see `film_features`)."""
 
     shapes: Shapes
     tree: Layout
@@ -122,6 +124,7 @@ class PackedScene:
     uv_sets: int
     buffers: Buffers
     counts: NDArray[Any]
+    film: set[str]
 
     @property
     def scene(self) -> Scene:
@@ -152,7 +155,9 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: R
     buffers |= camera_buffers(shapes.scene.camera)
     if scene.render.filter != "box":
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
-    return PackedScene(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, _counts(shapes, emitters))
+    counts = _counts(shapes, emitters)
+    film = film_features(scene, choices)
+    return PackedScene(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, counts, film)
 
 
 def _counts(shapes: Shapes, emitters: PackedLights) -> NDArray[Any]:

@@ -114,6 +114,19 @@ GUIDE = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
 DIRECT = record(direct="3f4", pad0="u4", direct_error="3f4", pad1="u4")
 #: If ALPHA is, the sum of their coverage. A film's pixels have a multiple of 32 bytes.
 ALPHA = record(alpha="f4", alpha_error="f4", pad_alpha="6i4")
+#: If CATCHER is, the sums of the light of those that see a catcher, with the objects and without, and their number.
+CATCHER = record(
+    caught="3f4",
+    catcher="f4",
+    caught_error="3f4",
+    catcher_error="f4",
+    bare="3f4",
+    pad_bare="f4",
+    bare_error="3f4",
+    pad_bare_error="f4",
+)
+#: A launch of a scene with catchers; bare: whether its objects are left out.
+LAUNCH_OF_CATCHERS = np.dtype([*LAUNCH.descr, *record(bare="i4", pad_bare="3i4").descr])
 #: A projected primitive (kernels/raster/outline.cl). edge0 … nearness: functions of the image position, or for a sphere
 #: its center and radius; instance: negative for spheres; rows: range of pixel rows that it may cover.
 OUTLINE = record(

@@ -10,6 +10,19 @@ from ...scene.model import Backdrop, Scene
 FloatArray = NDArray[np.float32]
 
 
+def sees_environment(scene: Scene) -> bool:
+    """Return whether the camera sees the environment behind the scene."""
+    hidden = scene.render.transparent or scene.backdrop is not None or not scene.environment.camera_visible
+    return not (hidden or catches(scene))
+
+
+def catches(scene: Scene) -> bool:
+    """Return whether surfaces of the scene are catchers, and not shown as any others."""
+    materials = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
+    materials += [each.material or each.mesh.material for each in scene.instances]
+    return scene.render.integrator in ("path", "direct") and any(material.catcher for material in materials)
+
+
 def backdrop_of(scene: Scene) -> FloatArray | None:
     """Return what is behind the scene, (height, width, 3) or (1, 1, 3): black if the environment is hidden without a
     backdrop; None if the image is transparent there, or shows the environment."""
@@ -17,7 +30,7 @@ def backdrop_of(scene: Scene) -> FloatArray | None:
         return None
     if scene.backdrop is not None:
         return backdrop_pixels(scene.backdrop, scene.render.size)
-    return None if scene.environment.camera_visible else np.zeros((1, 1, 3), np.float32)
+    return None if sees_environment(scene) else np.zeros((1, 1, 3), np.float32)
 
 
 def backdrop_pixels(backdrop: Backdrop, size: tuple[int, int]) -> FloatArray:

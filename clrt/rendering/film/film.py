@@ -29,6 +29,12 @@ def _sums(pixels: NDArray[Any], name: str) -> NDArray[np.float64]:
     return _in_planes(total)
 
 
+def _lit_parts(pixels: NDArray[Any]) -> NDArray[np.float64]:
+    """Return (height, width, 3): a catcher's light with the objects over that without, at most 1."""
+    caught, bare = _sums(pixels, "caught"), _sums(pixels, "bare")
+    return np.asarray(np.divide(caught, bare, out=np.ones_like(bare), where=bare > 0).clip(0, 1))
+
+
 def _padded(values: NDArray[np.float64], rows: tuple[int, int]) -> NDArray[np.float64]:
     """Pad with REACH columns on both sides and `rows` rows above and below, replicating the edge."""
     return _in_planes(np.pad(np.moveaxis(values, -1, 0), [(0, 0), rows, (REACH, REACH)], "edge"))
@@ -55,18 +61,24 @@ class Film:
 
     @cached_property
     def alpha(self) -> NDArray[np.float64] | None:
-        """(height, width): fraction of each pixel that the scene covers; None if the film does not store it."""
-        if "alpha" not in (self.pixels.dtype.names or ()):
+        """(height, width): fraction of each pixel that the scene covers, shadows on catchers included; None if the film
+        does not store it."""
+        if not self._has("alpha"):
             return None
-        alpha = np.empty(self.pixels.shape)
+        return 1 - np.concatenate(in_bands(self.pixels.shape, lambda rows: self._open(rows).min(axis=2)))
 
-        def fill(rows: slice) -> None:
-            pixels = self.pixels[rows]
-            total = pixels["alpha"].astype(np.float64) + pixels["alpha_error"]
-            alpha[rows] = np.clip(total / np.maximum(pixels["count"], 1), 0, 1)
+    def _open(self, rows: slice) -> NDArray[np.float64]:
+        """Return (height, width, 3) or (height, width, 1) for these rows: the fraction of what is behind the scene that
+        is in the image, by channels if there are catchers, which dim it."""
+        pixels = self.pixels[rows]
+        total = (pixels["alpha"].astype(np.float64) + pixels["alpha_error"])[..., None]
+        if self._has("catcher"):
+            count = pixels["catcher"].astype(np.float64) + pixels["catcher_error"]
+            total = total + count[..., None] * (1 - _lit_parts(pixels))
+        return np.asarray(1 - np.clip(total / np.maximum(pixels["count"], 1)[..., None], 0, 1))
 
-        in_bands(alpha.shape, fill)
-        return alpha
+    def _has(self, name: str) -> bool:
+        return name in (self.pixels.dtype.names or ())
 
     @property
     def direct(self) -> NDArray[np.float64]:
@@ -85,21 +97,28 @@ class Film:
         return mean
 
     def _fill_with_mean(self, mean: NDArray[np.floating[Any]], name: str) -> None:
-        alpha = self.alpha
-
         def fill(rows: slice) -> None:
             pixels = self.pixels[rows]
-            mean[rows] = _sums(pixels, name) / np.maximum(pixels["count"], 1)[..., None]
-            if alpha is not None and self.backdrop is not None:
-                mean[rows] += self._behind(rows, alpha)
+            total = _sums(pixels, name)
+            if self._has("catcher"):
+                total = np.maximum(total - self._dimmed(pixels), 0)
+            mean[rows] = total / np.maximum(pixels["count"], 1)[..., None]
+            if self.backdrop is not None and self._has("alpha"):
+                mean[rows] += self._open(rows) * self._behind(rows)
 
         in_bands(mean.shape, fill)
 
-    def _behind(self, rows: slice, alpha: NDArray[np.float64], power: int = 1) -> NDArray[np.float64]:
-        """Return the light of the backdrop in the mean of these rows, or with a power of 2 in that of the squares."""
+    def _dimmed(self, pixels: NDArray[Any]) -> NDArray[np.float64]:
+        """Return the sums of catchers' light that the backdrop stands for, dimmed as that is: by channels, or if it is
+        not part of the image, equally in all channels, by alpha. The image has the rest."""
+        if self.backdrop is not None:
+            return np.minimum(_sums(pixels, "caught"), _sums(pixels, "bare"))
+        return np.asarray(_lit_parts(pixels).min(axis=2)[..., None] * _sums(pixels, "bare"))
+
+    def _behind(self, rows: slice) -> NDArray[np.float64]:
+        """Return the backdrop in these rows."""
         assert self.backdrop is not None
-        backdrop = self.backdrop if len(self.backdrop) == 1 else self.backdrop[rows]
-        return np.asarray((1 - alpha[rows])[..., None] * backdrop.astype(np.float64) ** power)
+        return (self.backdrop if len(self.backdrop) == 1 else self.backdrop[rows]).astype(np.float64)
 
     @property
     def variance(self) -> NDArray[np.float64]:
@@ -113,8 +132,8 @@ class Film:
         count = pixels["count"].astype(np.float64)[..., None]
         with np.errstate(divide="ignore", invalid="ignore"):
             squares = _sums(pixels, "square") / count
-            if self.backdrop is not None and self.alpha is not None:  # a sample is covered or not, apart from glass
-                squares += self._behind(rows, self.alpha, 2)
+            if self.backdrop is not None and self._has("alpha"):  # a sample is covered or not, apart from glass
+                squares += self._open(rows) * self._behind(rows) ** 2
             summed = squares >= (1 - 1e-6) * most  # also false for NaN
             variance = np.where(summed, np.maximum(squares - most, 0) / (count - 1), most)
         return np.where(count < 2, np.nan, variance)

@@ -35,6 +35,7 @@ class Material:
       factor scales x and y
     - opacity: the fraction of light that interacts with the surface; the rest passes straight through
     - camera_visible: false for a surface that camera rays pass through, also where it emits; all others hit it
+    - catcher: the image does not show the surface, but what the scene's other surfaces change about its light
     - alpha_cutoff (alpha mask): the surface is opaque where the opacity reaches it, and absent elsewhere
     """
 
@@ -48,6 +49,7 @@ class Material:
     one_sided: bool = False
     double_sided: bool = False
     camera_visible: bool = True
+    catcher: bool = False
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
@@ -77,6 +79,8 @@ class Material:
             # Not a field's name: materials without it get 0, and are opaque whatever the alpha of vertex colors.
             parameters["cutoff"] = 0.0 if self.opacity == 1 else cutoff
             parameters |= {"opacity": self.opacity, "one_sided": one_sided}
+        if self.catcher:
+            parameters["catcher"] = 1.0
         return parameters
 
     @property

@@ -55,6 +55,7 @@ def scene_problems(scene: Scene) -> list[str]:
     problems += _image_problems(scene.environment, Environment, "environment")
     problems += [] if scene.backdrop is None else _image_problems(scene.backdrop, Backdrop, "backdrop")
     problems += _object_problems(scene.render, RenderSettings, "render") or _raster_problems(scene)
+    problems += _local_problems(scene)
     users: list[tuple[str, Mesh | Sphere | Instance]] = []
     of_mesh: dict[int, list[str]] = {}  # by its id
     for i, mesh in enumerate(scene.meshes):
@@ -227,9 +228,20 @@ def _material_problems(users: list[tuple[str, Mesh | Sphere | Instance]]) -> lis
     for where, material in first.values():
         found = _object_problems(material, Material, where)
         if isinstance(material, Material) and not found:
-            found = [f"{where}.{conflict}" for conflict in material.conflicts()]
+            found = [f"{where}.{conflict}" for conflict in material.conflicts()] + _catcher_problems(material, where)
         problems += found
     return problems
+
+
+def _catcher_problems(material: Material, where: str) -> list[str]:
+    """Return a problem if a catcher emits, or if the camera cannot see it."""
+    if not material.catcher:
+        return []
+    if any(material.radiance):
+        return [f"{where}.catcher: a catcher shows light that it receives, and this one emits; leave out one of them"]
+    if not material.camera_visible:
+        return [f"{where}.catcher: a catcher must be seen by the camera; leave out camera_visible = false"]
+    return []
 
 
 def _camera_problems(camera: Camera) -> list[str]:
@@ -266,6 +278,24 @@ def _raster_problems(scene: Scene) -> list[str]:
     return [
         f'render.integrator: "raster" supports only pinhole cameras, and the camera has {shown}; leave that out, '
         'or write "local"'
+    ]
+
+
+def _local_problems(scene: Scene) -> list[str]:
+    """Return a problem if a local integrator is to render catchers."""
+    integrator = getattr(scene.render, "integrator", None)
+    parts = [
+        *scene.meshes,
+        *scene.spheres,
+        *scene.instances,
+        *(getattr(each, "mesh", None) for each in scene.instances),
+    ]
+    caught = any(getattr(getattr(part, "material", None), "catcher", False) for part in parts)
+    if integrator not in ("local", "raster") or not caught:
+        return []
+    return [
+        f'render.integrator: "{integrator}" does not support catchers, which need light with and without the objects; '
+        'write "path" or "direct", or leave out catcher = true'
     ]
 
 
