@@ -64,6 +64,7 @@ def test_spheres_are_triangles_seen_from_outside() -> None:
         ),
         (replace(ball(MATERIALS[0]()), render=RenderSettings(clamp_indirect=1.0)), "room: clamps .*out clamp_indirect"),
         (replace(ball(MATERIALS[0]()), render=RenderSettings(filter="tent")), 'room: .*filter = "box"'),
+        (replace(ball(MATERIALS[0]()), render=RenderSettings(transparent=True)), "room: .*not exported to Cycles"),
     ],
 )
 def test_what_has_no_counterpart_is_refused_by_name(scene: Scene, words: str) -> None:

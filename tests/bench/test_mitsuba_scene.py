@@ -139,6 +139,8 @@ def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: s
     [
         (replace(ball(Diffuse()), render=RenderSettings(back_face_culling="camera")), "leave out back_face_culling"),
         (replace(ball(Diffuse()), render=RenderSettings(clamp_direct=1.0)), "leave out clamp_direct"),
+        (replace(ball(Diffuse()), render=RenderSettings(transparent=True)), "transparent, backdrop, .*leave them out"),
+        (ball(Diffuse(camera_visible=False)), "camera_visible are not exported to Mitsuba"),
         (ball(Diffuse(emission=(1, 1, 1), double_sided=True)), "leave out double_sided"),
     ],
 )

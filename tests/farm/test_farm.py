@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import clrt
 from clrt.device.device_info import Verdict
@@ -35,6 +36,7 @@ from clrt.scene.model import Scene
 from ..rendering.checkpoints import run, same
 from ..rendering.test_clamps import clamped
 from ..rendering.test_noise import room
+from ..rendering.test_wavefront import catching
 
 FAULTS = Path(__file__).with_name("faulty.py")
 SIZE = (93, 70)
@@ -87,7 +89,12 @@ def at_pass(running: Renderer, number: int, event: Callable[[], Any], **stops: f
 
 @pytest.mark.parametrize(
     "scene",
-    [clamped(room(), 0.5, 0.05), clrt.load(SCENES / "cornell.toml"), clrt.load(SCENES / "spheres.toml")],
+    [
+        clamped(room(), 0.5, 0.05),
+        clrt.load(SCENES / "cornell.toml"),
+        clrt.load(SCENES / "spheres.toml"),
+        replace(catching(room()), name="catching"),
+    ],
     ids=lambda scene: scene.name,
 )
 def test_same_picture(cluster: Cluster, small_tasks: None, scene: Scene) -> None:
@@ -244,6 +251,34 @@ def test_bands(cluster: Cluster, tmp_path: Path) -> None:
     assert again.summary()["noise"] == pytest.approx(expected.report["noise"], rel=0.1)
     assert 0 < again.summary()["clamped_part"] == pytest.approx(expected.report["clamped_part"], rel=1e-5)
     assert again.summary()["warnings"] == expected.report["warnings"] != []
+
+
+@pytest.mark.parametrize("behind", [None, np.random.default_rng(6).random((30, 20, 3)).astype(np.float32)])
+def test_bands_and_frames_with_alpha(cluster: Cluster, tmp_path: Path, behind: NDArray[np.float32] | None) -> None:
+    """Bands and whole images by workers are those of one process: with alpha, or each over its part of a backdrop."""
+    import OpenImageIO as oiio
+
+    scene = catching(room())
+    if behind is not None:
+        settings = replace(scene.render, transparent=False)
+        scene = replace(scene, render=settings, backdrop=clrt.Backdrop(image=behind))
+    options: dict[str, Any] = {"size": (40, 60), "device": 0}
+    expected = clrt.render(scene, spp=4, **options)
+    assert expected.alpha is not None and 0 < expected.alpha.mean() < 1
+    banded = BandedPicture(PictureOrder(scene, options, spp=4), tmp_path / "a.bands", band_pixels=40 * 16)
+    assert [*banded.render(cluster)][-1] == (4, 4)
+    for name in ("a.exr", "c.png", "d.webp"):
+        expected.save(tmp_path / name)
+        banded.save(tmp_path / f"of_{name}", "srgb", 0.0, {})
+        one, other = (
+            np.asarray(oiio.ImageBuf(str(tmp_path / each)).get_pixels(oiio.FLOAT)) for each in (name, f"of_{name}")
+        )
+        assert one.shape[2] == (4 if behind is None else 3)
+        np.testing.assert_array_equal(one, other)
+    options["seed"] = 2
+    pictures = WholePictures(cluster, ["one"], lambda name: PictureOrder(scene, options, spp=4))
+    found = [result for result in pictures.results() if result is not None]
+    np.testing.assert_array_equal(clrt.Image(**found[0][1]).layers, clrt.render(scene, spp=4, **options).layers)
 
 
 def test_a_scheduler_that_comes_back(

@@ -238,6 +238,19 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
             "[sky]\ntime = 2026-12-21T16:00:00Z\nlatitude = 60\nlongitude = 0",
             "degrees below the horizon, where the model ends; write one when it is up",
         ),
+        ("[backdrop]\nimage = 3", "backdrop.image: 3 is not a string; write a file name in quotes"),
+        ('[backdrop]\nimage = "lost.jpg"', "backdrop.image: {folder}/lost.jpg: no such picture file"),
+        ("[backdrop]\ncolour = [1, 1, 1]", 'backdrop: key "colour" is unknown; did you mean "color"?'),
+        ("[backdrop]\ncolor = [1, -1, 1]", "backdrop.color[1]: -1 is below 0; write at least 0"),
+        ("backdrop = 3", "backdrop: 3 is not a table; write [backdrop]"),
+        (
+            f'[render]\nintegrator = "local"\n[materials.m]\ntype = "mirror"\ncatcher = true\n{MESH}material = "m"',
+            'render.integrator: "local" does not support catchers, which need light with and without the objects',
+        ),
+        (
+            '[materials.m]\ntype = "diffuse"\nemission = [1, 1, 1]\ncatcher = true\n[[sphere]]\nmaterial = "m"',
+            "sphere[0].material.catcher: a catcher shows light that it receives, and this one emits",
+        ),
         ("[camera\nposition = 3", "is not valid TOML: "),
         (f"[camera]\nposition = [1{'0' * 5000}, 0, 0]", "is not valid TOML: "),
         (f"[camera]\nposition = [0x1{'0' * 5000}, 0, 0]", "camera.position: [0x10000"),
@@ -245,7 +258,7 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
 )
 def test_each_mistake(text: str, sentence: str, folder: Path) -> None:
     (problem,) = problems(folder, text)
-    assert sentence in problem
+    assert sentence.replace("{folder}", str(folder)) in problem
 
 
 def test_syntax_error_names_the_line(folder: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 from clrt.errors import SceneError
 from clrt.formats.load_scene import load
 from clrt.formats.toml.writer import scene_files, started
+from clrt.output.images import write_image
 from clrt.output.scenes import save_scene
 from clrt.rendering.checkpoint.identity import facts_of
 from clrt.rendering.compile.choices import Choices
@@ -21,7 +22,7 @@ from clrt.scene.editing import materials_of, with_material
 from clrt.scene.lights import Light, PointLight
 from clrt.scene.materials.material_types import Dielectric, Diffuse, MetallicRoughness, Mirror
 from clrt.scene.materials.textures import Picture, Texture
-from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Backdrop, Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.sky.sky import Sky
 
 from .glb import Gltf, ball
@@ -174,7 +175,8 @@ def test_changed_models_are_written(tmp_path: Path) -> None:
 
 
 def test_what_no_scene_file_can_say_is_written_beside_it(tmp_path: Path) -> None:
-    """A mesh with all attributes, instances of a hidden mesh, an environment map and a texture, made in Python."""
+    """A mesh with all attributes, instances of a hidden mesh, an environment map, a backdrop and a texture, made in
+    Python."""
     rng = np.random.default_rng(0)
     directions = np.array([[0, 0, 1], [0, 1, 0], [1, 0, 0]], np.float32)
     faces = np.array([[0, 1, 2]], np.int32)
@@ -198,7 +200,8 @@ def test_what_no_scene_file_can_say_is_written_beside_it(tmp_path: Path) -> None
         meshes=[mesh],
         spheres=[Sphere(material=coated)],
         instances=[Instance(hidden, place, name=f"{i}") for i, place in enumerate(places)],
-        environment=Environment(image=rng.random((4, 8, 3), np.float32)),
+        environment=Environment(image=rng.random((4, 8, 3), np.float32), camera_visible=False),
+        backdrop=Backdrop(image=rng.random((3, 5, 3), np.float32)),
     )
     written = again(scene, tmp_path / "scene.toml")
     check_same(scene, written)
@@ -208,6 +211,7 @@ def test_what_no_scene_file_can_say_is_written_beside_it(tmp_path: Path) -> None
         "scene.all_of_it_2.glb",
         "scene.some_wood.png",
         "scene.sky.exr",
+        "scene.backdrop.exr",
     }
     check_same(written, again(written, tmp_path / "again.toml"))
 
@@ -274,3 +278,19 @@ def test_many_materials_are_named_at_once() -> None:
     scene = Scene(spheres=[Sphere(material=Diffuse()) for _ in range(30_000)])
     named = materials_of(scene)
     assert len(named) == 30_000 and list(named)[:3] == ["sphere", "sphere 2", "sphere 3"]
+
+
+def test_backdrops_and_catchers_round_trip(tmp_path: Path) -> None:
+    """A backdrop's color, or its file by name, and what the camera does not see, or sees the shadow of."""
+    picture = tmp_path / "photo.png"
+    write_image(picture, np.full((2, 3, 3), 0.5, np.float32))
+    text = "[render]\ntransparent_glass = true\n[environment]\ncamera_visible = false\n[backdrop]\n{}\n"
+    text += '[materials.m]\ntype = "mirror"\ncatcher = true\n[[sphere]]\nmaterial = "m"\n'
+    for line in ("color = [0.1, 2.0, 3.0]", 'image = "photo.png"', ""):
+        (tmp_path / "a.toml").write_text(text.format(line))
+        scene = load(tmp_path / "a.toml")
+        assert scene.backdrop is not None and (scene.backdrop.image is None) == ("image" not in line)
+        written = again(scene, tmp_path / "b.toml")
+        check_same(scene, written)
+        assert "image" not in line or 'image = "photo.png"' in (tmp_path / "b.toml").read_text()
+        assert written.spheres[0].material.catcher and not written.environment.camera_visible

@@ -22,6 +22,7 @@ from ...scene.materials.material_types import Dielectric, Diffuse, Material, Met
 from ...scene.materials.textures import untextured
 from ...scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from ..rays.hard_meshes import icosphere
+from .camera_visibility import check_seen_as_lit
 
 #: Near and far clip distances, relative to the distance of the look-at point.
 NEAR, FAR = 1e-4, 1e6
@@ -53,6 +54,7 @@ def check_scene(scene: Scene) -> None:
         raise UsageError(f'{scene.name}: Cycles has no integrator "local"')
     if scene.render.back_face_culling != "none":
         raise UsageError(f"{scene.name}: back_face_culling is not exported to Cycles; leave it out")
+    check_seen_as_lit(scene, "Cycles")
     if biases := biased_by(scene.render):
         raise UsageError(f"{scene.name}: clamps are not exported to Cycles; leave out {' and '.join(biases)}")
     if scene.render.filter != "box" or scene.render.max_depth < 2:

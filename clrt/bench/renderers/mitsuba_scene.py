@@ -21,6 +21,7 @@ from ...scene.lights import DirectionalLight, GoniometricLight, Light, PointLigh
 from ...scene.materials.material_types import Dielectric
 from ...scene.materials.textures import Texture
 from ...scene.model import Camera, Environment, Mesh, Scene, Sphere
+from .camera_visibility import check_seen_as_lit
 from .mitsuba_bsdfs import Plugin, bsdf, color, medium, rgb
 
 #: Near and far clip distances, relative to the distance of the look-at point.
@@ -41,6 +42,7 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
         raise UsageError(f'{scene.name}: Mitsuba has no integrator "{scene.render.integrator}"')
     if scene.render.back_face_culling != "none":
         raise UsageError(f"{scene.name}: Mitsuba culls no back faces; leave out back_face_culling")
+    check_seen_as_lit(scene, "Mitsuba")
     if biases := biased_by(scene.render):
         raise UsageError(f"{scene.name}: Mitsuba clamps nothing; leave out {' and '.join(biases)}")
     depth = scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
