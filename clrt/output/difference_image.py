@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats.images.image_reader import read_picture
+from ..formats.images.image_reader import read_layers
 from .file_formats import is_shown
 from .image_error import RELMSE_FLOOR, check_sizes
 from .images import check_writable, write_image
@@ -27,7 +27,7 @@ def write_difference(path: Path, image: Path, reference: Path) -> float:
     OutputError, and SceneError naming the files if they cannot be read or compared.
     """
     check_writable(path)
-    x, r = read_picture(image), read_picture(reference)
+    (x, _), (r, _) = read_layers(image), read_layers(reference)
     check_sizes(x, r, str(image), str(reference))
     with np.errstate(invalid="ignore", over="ignore"):
         difference = x - r
@@ -50,7 +50,7 @@ def clipping(image: Path, reference: Path) -> str | None:
     for clipped, linear in ((image, reference), (reference, image)):
         if not is_shown(clipped) or is_shown(linear):
             continue
-        levels, radiance = read_picture(clipped), read_picture(linear)
+        (levels, _), (radiance, _) = read_layers(clipped), read_layers(linear)
         at_white = levels >= levels.dtype.type(1)
         beyond = at_white & (radiance > 1) if levels.shape == radiance.shape else np.zeros(1, bool)
         if np.mean(beyond) >= CLIPPED:

@@ -53,11 +53,20 @@ class Image:
         and unassociated in the others that have it; a .jpg and an .hdr show the scene over black. Raises OutputError
         if that fails.
         """
-        pixels, data = self.layers, shown_data(self.report.get("integrator", "path"), self.pixels)
-        if data is not None and is_shown(Path(path)):
-            pixels, view, exposure = np.concatenate([data, pixels[..., 3:]], axis=2), "raw", 0.0
+        pixels = self.layers
+        if is_shown(Path(path)) and (data := self._shown_data()) is not None:
+            pixels, view, exposure = data, "raw", 0.0
         write_image(Path(path), pixels, metadata=self.metadata(), view=view, exposure=exposure, aovs=self.aovs)
         return Path(path)
+
+    def _shown_data(self) -> NDArray[np.float32] | None:
+        """Return what formats with a view show of data, with its alpha; None for images of light."""
+        integrator, alpha = self.report.get("integrator", "path"), self.layers[..., 3:]
+        if not alpha.size:
+            return shown_data(integrator, self.pixels)
+        straight = np.divide(self.pixels, alpha, out=np.zeros_like(self.pixels), where=alpha > 0)
+        data = shown_data(integrator, straight)
+        return None if data is None else np.concatenate([data * alpha, alpha], axis=2)
 
     def metadata(self) -> dict[str, str]:
         """Return the report's scalar values, for the file's header."""

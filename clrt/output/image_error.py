@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError, UsageError
 from ..file_names import StrPath
 from ..float_errors import with_default_errors
-from ..formats.images.image_reader import read_picture
+from ..formats.images.image_reader import read_layers
 from .image import Image
 
 FloatArray = NDArray[np.float32]
@@ -27,9 +27,10 @@ FLIP_MIN = 1e-5
 
 def compare_files(image: Path, reference: Path) -> dict[str, Any]:
     """Run `compare` on two image files, with HDR-FLIP if either is .exr or .hdr. Raises SceneError naming the files."""
-    pixels, truth = read_picture(image), read_picture(reference)
-    check_sizes(pixels, truth, str(image), str(reference))
-    return _measures(pixels, truth, bool({image.suffix.lower(), reference.suffix.lower()} & {".exr", ".hdr"}))
+    ours, theirs = read_layers(image), read_layers(reference)
+    check_sizes(ours[0], theirs[0], str(image), str(reference))
+    hdr = bool({image.suffix.lower(), reference.suffix.lower()} & {".exr", ".hdr"})
+    return _measures(ours[0], theirs[0], hdr) | _alpha_measure(ours[1], theirs[1])
 
 
 @with_default_errors
@@ -43,25 +44,37 @@ def compare(image: AnyImage, reference: AnyImage, *, hdr: bool = True) -> dict[s
     - flip: mean HDR-FLIP (if `hdr`) or LDR-FLIP; None if flip-evaluator is not installed or HDR-FLIP's reference black
     - nonfinite, nonfinite_reference: the number of values of x and of r that are NaN or Inf. Where either is, the value
       is excluded from all the measures above (for FLIP it is 0 in both); a measure without any value left is None.
+    - alpha_max_abs: if one of them has alpha, the largest difference, where an image without has 1; colors are compared
+      premultiplied
 
     Raises SceneError if a file cannot be read or the sizes differ, and UsageError if an argument is not an image.
     """
-    x, r = _pixels(image, "the image"), _pixels(reference, "the reference")
+    (x, covered), (r, of_reference) = _layers(image, "the image"), _layers(reference, "the reference")
     check_sizes(x, r, "the image", "the reference")
-    return _measures(x, r, hdr)
+    return _measures(x, r, hdr) | _alpha_measure(covered, of_reference)
 
 
-def _pixels(picture: AnyImage, name: str) -> FloatArray:
-    """Return the pixels (h, w, 3) of an image in any of the accepted forms."""
+def _alpha_measure(alpha: FloatArray | None, reference: FloatArray | None) -> dict[str, Any]:
+    """Return the measure of alpha, if an image has it."""
+    if alpha is None and reference is None:
+        return {}
+    one, other = (np.ones((1, 1)) if each is None else each.astype(np.float64) for each in (alpha, reference))
+    return {"alpha_max_abs": float(np.nanmax(np.abs(one - other)))}
+
+
+def _layers(picture: AnyImage, name: str) -> tuple[FloatArray, FloatArray | None]:
+    """Return the pixels (h, w, 3) of an image in any of the accepted forms, and its alpha, if it is transparent."""
     if isinstance(picture, str | PathLike):
-        return read_picture(Path(picture))
+        return read_layers(Path(picture))
+    if isinstance(picture, Image) and picture.layers.shape[2] == 4:
+        return picture.pixels, picture.alpha
     pixels = picture.pixels if isinstance(picture, Image) else picture
     if not isinstance(pixels, np.ndarray) or pixels.ndim != 3 or pixels.shape[2] != 3:
         raise UsageError(
             f"{name} is {type(pixels).__name__} {getattr(pixels, 'shape', '')}, not (height, width, 3) "
             "pixels; give such an array, a clrt.Image or the path of an image"
         )
-    return pixels
+    return pixels, None
 
 
 def _measures(image: FloatArray, reference: FloatArray, hdr: bool) -> dict[str, Any]:

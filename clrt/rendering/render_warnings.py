@@ -43,8 +43,8 @@ def bias_warnings(settings: RenderSettings, removed: float) -> list[str]:
 
 def black_warnings(settings: RenderSettings, features: Iterable[str], brightest: float, cause: str) -> list[str]:
     """Return one warning if an image of light is black although something emits: its brightest value is below BLACK.
-    cause: the likely cause if that value is 0."""
-    if brightest >= BLACK or not _shows_light(settings) or _is_dark(features):
+    cause: the likely cause if that value is 0. An image of catchers may have shadows alone."""
+    if brightest >= BLACK or not _shows_light(settings) or _is_dark(features) or "CATCHER" in features:
         return []
     if brightest > 0:
         stops = np.ceil(-np.log2(2 * brightest))

@@ -13,10 +13,11 @@ from PIL import Image as Pictures, ImageSequence
 
 from clrt.output.denoise import Denoiser, denoised
 from clrt.output.image import Image
+from clrt.output.image_error import compare, compare_files
 from clrt.output.images import write_image
 from clrt.output.row_writer import write_rows
 from clrt.output.video import write_video
-from clrt.output.view_transform import to_display
+from clrt.output.view_transform import to_display, transparent_levels
 
 FloatArray = NDArray[np.float32]
 
@@ -83,6 +84,50 @@ def test_sixteen_bits_and_rows(tmp_path: Path) -> None:
         )
         np.testing.assert_array_equal(rows, whole)
         assert whole.shape[2] == (3 if suffix in (".jpg", ".hdr") else 4)
+
+
+def test_compare_uses_associated_colors_and_alpha(tmp_path: Path) -> None:
+    """A .png and an .exr of one image are the same but for 8 bits; alpha counts by itself."""
+    pixels = layers().clip(0, 1)
+    pixels[..., :3] = np.minimum(pixels[..., :3], pixels[..., 3:])
+    other = pixels.copy()
+    other[3, 4, 3] -= 0.25
+    for name, image in (("a.png", pixels), ("a.exr", pixels), ("b.exr", other)):
+        write_image(tmp_path / name, image)
+    result = compare_files(tmp_path / "a.png", tmp_path / "a.exr")
+    assert result["max_abs"] < 0.006 and result["alpha_max_abs"] < 0.0021
+    one, two = (Image(each[..., :3], alpha=each[..., 3]) for each in (pixels, other))
+    for found in (compare_files(tmp_path / "b.exr", tmp_path / "a.exr"), compare(two, one)):
+        assert found["max_abs"] == 0 and found["alpha_max_abs"] == pytest.approx(0.25, abs=1e-6)
+    assert compare(one, pixels[..., :3])["alpha_max_abs"] == 1 and "alpha_max_abs" not in compare(
+        normal := pixels[..., :3], normal
+    )
+
+
+def test_normals_with_alpha(tmp_path: Path) -> None:
+    """Of a half-covered pixel the .png shows the covering surface's normal."""
+    normals = np.array([[(0.0, 0.0, 0.5), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)]], np.float32)
+    image = Image(normals, {"integrator": "normals"}, alpha=np.array([[0.5, 1.0, 0.0]], np.float32))
+    image.save(tmp_path / "n.png")
+    found = np.asarray(Pictures.open(tmp_path / "n.png"))[0].tolist()
+    assert found == [[128, 128, 255, 128], [128, 128, 255, 255], [0, 0, 0, 0]]
+
+
+def test_the_window_shows_alpha() -> None:
+    """What is drawn over the window's background is what a .png holds."""
+    from clrt.live.settings import Settings
+    from clrt.live.snapshot import Snapshot
+    from clrt.scene.model import Scene
+    from clrt.window.tone_mapping import DisplaySettings, tone_mapped
+
+    pixels = layers()
+    snapshot = Snapshot(scene=Scene(), settings=Settings(), pixels=pixels[..., :3], alpha=pixels[..., 3], size=(48, 32))
+    shown = tone_mapped(snapshot, DisplaySettings()).rgba
+    np.testing.assert_array_equal(shown, transparent_levels(pixels, "srgb", 0.0, np.uint8))
+    opaque = tone_mapped(
+        Snapshot(scene=Scene(), settings=Settings(), pixels=pixels[..., :3], size=(48, 32)), DisplaySettings()
+    )
+    assert (opaque.rgba[..., 3] == 255).all()
 
 
 def test_formats_without_alpha_are_over_black(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

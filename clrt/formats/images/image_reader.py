@@ -34,15 +34,28 @@ def read_picture(path: StrPath) -> NDArray[np.float32]:
     is grey; alpha is dropped; of several layers the one that has the image is read (see `color_channels`). Raises
     SceneError naming the file if it is missing, empty, damaged, or has no color channels.
     """
-    path = Path(path)
+    return _read_linear(Path(path))[0]
+
+
+def read_layers(path: StrPath) -> tuple[NDArray[np.float32], NDArray[np.float32] | None]:
+    """Return an image's pixels as `read_picture`, but premultiplied by alpha, and its alpha (h, w), None without one.
+    Alpha of float files is associated, that of others is not."""
+    pixels, alpha, associated = _read_linear(Path(path))
+    return (pixels if alpha is None or associated else pixels * alpha[..., None]), alpha
+
+
+def _read_linear(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] | None, bool]:
+    """Return linear pixels, alpha if there is one, and whether it is associated."""
     _check_stored(path)
     if (radiance := read_radiance(path)) is not None:
-        return radiance
+        return radiance, None, False
     pixels, names = _stored(path, str(path))
-    colours = pixels[..., _colour_channels(names)]
-    if colours.dtype == np.float32:
-        return colours
-    return linear_from_srgb(np.asarray(colours / np.float32(np.iinfo(colours.dtype).max), np.float32))
+    colours, alpha = pixels[..., _colour_channels(names)], pixels[..., -1] if names.endswith("A") else None
+    if pixels.dtype == np.float32:
+        return colours, alpha, True
+    most = np.float32(np.iinfo(pixels.dtype).max)
+    linear = linear_from_srgb(np.asarray(colours / most, np.float32))
+    return linear, None if alpha is None else np.asarray(alpha / most, np.float32), False
 
 
 def read_texels(source: StrPath | bytes, name: str = "") -> NDArray[np.uint8]:
