@@ -91,7 +91,7 @@ class BaseLight(ABC):
 
     @abstractmethod
     def parameters(self) -> dict[str, Parameter]:
-        """Return the values its kernel file reads: numbers and triples, the same names for all that it samples."""
+        """Return the values its kernel file reads: numbers and triples; others have 0 for one that only some return."""
 
     @abstractmethod
     def bounds(self) -> Bounds | DistantBounds:
@@ -308,7 +308,8 @@ class DirectionalLight(BaseLight):
     """Light from infinitely far away that travels along `direction`; `irradiance`: W/m² on a surface facing it.
 
     angle_degrees: the angular diameter of its disc, which is visible to the camera and in reflections and softens
-    shadows; 0 (or less than 1e-4) for a delta light, found by shadow rays only. The sun's is 0.53.
+    shadows; 0 (or less than 1e-4) for a delta light, found by shadow rays only. The sun's is 0.53. camera_visible:
+    whether the camera sees the disc.
     """
 
     kernel: ClassVar[str] = "directional"
@@ -316,6 +317,7 @@ class DirectionalLight(BaseLight):
     direction: Vector
     irradiance: Radiance
     angle_degrees: Annotated[float, Ge(0), Le(180)] = 0.0
+    camera_visible: bool = True
 
     @classmethod
     def kernels(cls) -> tuple[str, ...]:
@@ -336,7 +338,16 @@ class DirectionalLight(BaseLight):
         towards = unit_vector(self.direction, -1)
         if self.sampled_by == "directional":
             return {"towards": towards, "irradiance": self.irradiance}
-        return {"towards": towards, "radiance": self.radiance, "height": one_minus_cos(self.angle_degrees / 2)}
+        hidden = {} if self.camera_visible else {"camera_hidden": 1.0}
+        return {
+            "towards": towards,
+            "radiance": self.radiance,
+            "height": one_minus_cos(self.angle_degrees / 2),
+            **hidden,
+        }
+
+    def features(self) -> frozenset[str]:
+        return frozenset(() if self.camera_visible or self.sampled_by != "sun" else {"HIDDEN_SUNS"})
 
     def bounds(self) -> DistantBounds:
         """Return an upper bound. The highest point of a disc has elevation h + a, where h is the elevation of its

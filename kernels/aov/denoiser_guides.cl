@@ -35,7 +35,8 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
         escaped = escaped & (depth > 1 ? ALL_LANES : NO_LANES);
 #endif
         if (ANY(escaped)) {
-            real3 sky = environment_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO)));
+            real3 sky = environment_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO))
+                                             CAMERA_ARGUMENT(depth == 1));
             real3 bounded = vector(minimum(sky.x, ONE), minimum(sky.y, ONE), minimum(sky.z, ONE));
             seen.albedo = choose(escaped, mul(tint, bounded), seen.albedo);
         }

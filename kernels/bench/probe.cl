@@ -310,7 +310,8 @@ kernel void probe_sky(SCENE_PARAMETERS, uint n, global const float *in, global f
 // sampled with that pdf
 kernel void probe_environment(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
-    put3(out, n, 0, environment_radiance(&scene, ROW3(in, 6)));
-    put3(out, n, 3, environment_light(&scene, ROW3(in, 0), ROW3(in, 3), ROW3(in, 6), ROW(in, 9), NO_LANES));
+    put3(out, n, 0, environment_radiance(&scene, ROW3(in, 6) CAMERA_ARGUMENT(false)));
+    put3(out, n, 3, environment_light(&scene, ROW3(in, 0), ROW3(in, 3), ROW3(in, 6), ROW(in, 9), NO_LANES
+                                 CAMERA_ARGUMENT(false)));
 }
 #endif

@@ -50,7 +50,7 @@ static inline void note_arrival(const Scene *scene, const Path *path, const Surf
     v->primitive = hit ? hits->primitive : (ireal)(-1);
     v->instance = hit ? hits->instance : (ireal)(0);
     v->emission = add(emitted_light(scene, path, surface, hits->t, hit),
-                      escaped_light(scene, path, LIT(path, depth, escaped)));
+                      escaped_light(scene, path, LIT(path, depth, escaped) CAMERA_ARGUMENT(depth == 1)));
 #if EMITTERS
     real pdf;
     v->emitter = hit ? surface->light : (ireal)(-1);
@@ -59,7 +59,7 @@ static inline void note_arrival(const Scene *scene, const Path *path, const Surf
 #if ENVIRONMENT
     if (ANY(escaped)) {
         real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));
-        v->radiance = choose(escaped, environment_radiance(scene, wi), v->radiance);
+        v->radiance = choose(escaped, environment_radiance(scene, wi CAMERA_ARGUMENT(depth == 1)), v->radiance);
     }
 #endif
 }

@@ -22,14 +22,15 @@
 
 // 1. Emission at the end of the ray: emissive surfaces and the environment.
 static inline real3 seen_light(const Scene *scene, real3 origin, real3 direction, const Surface *surface, real t, ireal hit,
-                               ireal escaped) {
+                               ireal escaped CAMERA_PARAMETER) {
     real3 L = splat(ZERO);
 #if EMITTERS
     real pdf;
     L = choose(hit, emitter_radiance(scene, origin, direction, direction, t, surface, hit, &pdf), L);
 #endif
 #if ENVIRONMENT
-    if (ANY(escaped)) L = choose(escaped, environment_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO))), L);
+    if (ANY(escaped)) L = choose(escaped, environment_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO))
+                                                               CAMERA_ARGUMENT(from_camera)), L);
 #endif
     return L;
 }
@@ -101,7 +102,8 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
         if (depth == 1) *alpha = hit ? ONE : ZERO;
         else *alpha -= (passed.x + passed.y + passed.z) * (1.0f / 3.0f);
 #endif
-        real3 seen = seen_light(scene, origin, direction, &surface, hits.t, hit, LIT(clear, active & !hit));
+        real3 seen = seen_light(scene, origin, direction, &surface, hits.t, hit, LIT(clear, active & !hit)
+                                CAMERA_ARGUMENT(depth == 1));
         L = add(L, choose(active, mul(beta, seen), splat(ZERO)));
         active = hit;
         if (depth >= launch->max_depth || !ANY(active)) return L;

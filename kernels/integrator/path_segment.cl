@@ -129,11 +129,11 @@ static inline real3 emitted_light(const Scene *scene, const Path *path, const Su
 }
 
 // … and the environment: the sky, and suns with a size.
-static inline real3 escaped_light(const Scene *scene, const Path *path, ireal escaped) {
+static inline real3 escaped_light(const Scene *scene, const Path *path, ireal escaped CAMERA_PARAMETER) {
 #if ENVIRONMENT
     if (!ANY(escaped)) return splat(ZERO);
     real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));   // NaN in inactive lanes gives no valid texel
-    real3 light = environment_light(scene, path->p, path->n, wi, path->pdf, path->specular);
+    real3 light = environment_light(scene, path->p, path->n, wi, path->pdf, path->specular CAMERA_ARGUMENT(from_camera));
     return choose(escaped, at_eye(path, light), splat(ZERO));
 #else
     return splat(ZERO);

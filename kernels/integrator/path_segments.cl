@@ -22,7 +22,8 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
 #endif
         absorb(path, hit ? hits.t : (real)(INFINITY));
         L = add(L, clamped(launch, emitted_light(scene, path, &surface, hits.t, hit), depth, removed));
-        L = add(L, clamped(launch, escaped_light(scene, path, LIT(path, depth, active & !hit)), depth, removed));
+        L = add(L, clamped(launch, escaped_light(scene, path, LIT(path, depth, active & !hit) CAMERA_ARGUMENT(depth == 1)),
+                           depth, removed));
 #if DIRECT_LIGHT
         if (depth <= 2) *direct = L;
 #endif

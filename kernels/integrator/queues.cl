@@ -138,7 +138,8 @@ kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, 
 #if ALPHA
                 q.light[shaded.travel.slot + ALPHA_ROW * q.capacity] += coverage(path, depth, false, true);
 #endif
-                add_light(&q, &launch, shaded.travel.slot, escaped_light(&scene, path, LIT(path, depth, true)), depth);
+                add_light(&q, &launch, shaded.travel.slot, escaped_light(&scene, path, LIT(path, depth, true)
+                                                                         CAMERA_ARGUMENT(depth == 1)), depth);
             }
 #if PRIMITIVES
             else shade_hit(&scene, &q, &launch, tiles, depth, &hits, &shaded);

@@ -165,7 +165,8 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
         Travel travel;
         LOAD(travel, w->escapes, i)
         absorb(&travel.path, (real)(INFINITY));
-        add_light(w, travel.slot, escaped_light(scene, &travel.path, LIT(&travel.path, depth, lanes_of(i, escaped))), depth);
+        add_light(w, travel.slot, escaped_light(scene, &travel.path, LIT(&travel.path, depth, lanes_of(i, escaped))
+                                                CAMERA_ARGUMENT(depth == 1)), depth);
 #if CLEAR_GLASS
         ireal passed = lanes_of(i, escaped);
         if (depth > 1) add_to_slots(w->alpha, travel.slot, coverage(&travel.path, depth, !passed, passed), passed);

@@ -88,23 +88,36 @@ static inline real3 escaped_radiance(const Scene *scene, real3 p, real3 n, real3
 }
 #endif
 
+// With HIDDEN_SUNS, whether the ray is a camera ray, to which some suns are invisible.
+#if HIDDEN_SUNS
+#define CAMERA_PARAMETER , int from_camera
+#define CAMERA_ARGUMENT(from_camera) , from_camera
+#define HIDE_SUN(scene, sun, dark) from_camera && RECORD((scene)->sun_lights, sun)->camera_hidden != 0.0f ? dark :
+#else
+#define CAMERA_PARAMETER
+#define CAMERA_ARGUMENT(from_camera)
+#define HIDE_SUN(scene, sun, dark)
+#endif
+
 #if ENVIRONMENT
 // Radiance along wi from the sky and all suns.
-static inline real3 environment_radiance(const Scene *scene, real3 wi) {
+static inline real3 environment_radiance(const Scene *scene, real3 wi CAMERA_PARAMETER) {
     real3 radiance = splat(ZERO);
     real pdf;
 #if SKY
     radiance = sky_radiance(scene, wi, &pdf);
 #endif
 #if LIGHT_SUN
-    for (int sun = 0; sun < scene->counts.sun_lights; ++sun) radiance = add(radiance, sun_radiance(scene, sun, wi, &pdf));
+    for (int sun = 0; sun < scene->counts.sun_lights; ++sun)
+        radiance = HIDE_SUN(scene, sun, radiance) add(radiance, sun_radiance(scene, sun, wi, &pdf));
 #endif
     return radiance;
 }
 
 // The same at p, with the radiance of each light multiplied by its MIS weight: wi was sampled by the BSDF with
 // density `pdf`, or is a specular direction, which light sampling cannot find.
-static inline real3 environment_light(const Scene *scene, real3 p, real3 n, real3 wi, real pdf, ireal specular) {
+static inline real3 environment_light(const Scene *scene, real3 p, real3 n, real3 wi, real pdf, ireal specular
+                                      CAMERA_PARAMETER) {
     real3 light = splat(ZERO);
     real other;
 #if SKY
@@ -114,7 +127,7 @@ static inline real3 environment_light(const Scene *scene, real3 p, real3 n, real
 #if LIGHT_SUN
     int first = scene->counts.lights - scene->counts.sky_lights - scene->counts.sun_lights;
     for (int sun = 0; sun < scene->counts.sun_lights; ++sun) {
-        real3 disc = sun_radiance(scene, sun, wi, &other);
+        real3 disc = HIDE_SUN(scene, sun, splat(ZERO)) sun_radiance(scene, sun, wi, &other);
         if (!ANY(other > 0.0f)) continue;
         other *= light_probability(scene, p, n, (ireal)(first + sun));
         light = add(light, scale(disc, specular ? ONE : bsdf_sample_weight(pdf, other)));

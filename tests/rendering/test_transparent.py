@@ -14,6 +14,7 @@ from clrt.device.open import Device
 from clrt.rendering.film.backdrop import backdrop_pixels
 from clrt.rendering.film.film import Film
 from clrt.rendering.renderer import Renderer
+from clrt.scene.lights import DirectionalLight, Light
 from clrt.scene.materials.material_types import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Backdrop, Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.render_settings import Integrator
@@ -161,6 +162,34 @@ def test_a_hidden_lamp_still_lights(device: Device) -> None:
     np.testing.assert_allclose(unseen[outside], seen[outside], rtol=2e-2)
     depth = replace(scene.render, integrator="depth")
     np.testing.assert_allclose(film(device, replace(scene, spheres=[hidden], render=depth), 1).mean, 5, rtol=1e-6)
+
+
+@pytest.mark.parametrize("integrator", ["path", "local"])
+def test_a_hidden_sun_still_lights(device: Device, integrator: Integrator) -> None:
+    """Its disc is not behind the scene, but in a mirror, and a ball is as bright as before; another sun is visible."""
+    corners = np.array([(-9, -0.5, -90), (-9, -0.5, 9), (9, -0.5, 9), (9, -0.5, -90)], np.float32)
+    floor = Mesh(corners, np.array([(0, 1, 2), (0, 2, 3)], np.int32), Mirror())
+    suns = [
+        DirectionalLight(direction=(x, -0.12, 1.0), irradiance=(1.0, 2.0, 3.0), angle_degrees=4.0) for x in (-0.3, 0.3)
+    ]
+    scene = Scene(
+        meshes=[floor],
+        spheres=[Sphere(center=(0.0, 0.0, 0.0), radius=0.4, material=Diffuse())],
+        camera=Camera(position=(0.0, 0.0, 5.0), look_at=(0.0, 0.0, 0.0)),
+        render=RenderSettings(size=SIZE, integrator=integrator),
+    )
+    hidden = [replace(suns[0], camera_visible=False), suns[1]]
+    without, seen, unseen = (
+        film(device, replace(scene, lights=list[Light](lights)), 64, sampler="sobol").mean
+        for lights in (suns[1:], suns, hidden)
+    )
+    disc = np.abs(seen - unseen).max(axis=2) > 1
+    right = np.arange(SIZE[0]) >= SIZE[0] // 2
+    assert 1 < disc.sum() < 20 and unseen[disc].max() == 0 and not disc[:, ~right].any()
+    above, below = np.split(unseen, 2)
+    assert above[:, ~right].max() > 50 and below[:, right].max() > 50  # the other one, and this one's reflection
+    assert (unseen - without)[:, 8:16].max() > 0.003  # the rim of the ball
+    np.testing.assert_allclose(unseen[~disc], seen[~disc], atol=1e-5)
 
 
 def test_coverage_in_checkpoints_and_on_several_devices(device: Device, tmp_path: Path) -> None:

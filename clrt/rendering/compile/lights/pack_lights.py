@@ -92,9 +92,10 @@ def _records(lights: Sequence[Light], images: PackedLightImages) -> NDArray[Any]
         {name: images.number(value) if isinstance(value, LightImage) else value for name, value in named.items()}
         for named in (light.parameters() for light in lights)
     ]
-    records = np.zeros(len(values), parameter_record(values[:1]))
-    for name in values[0]:
-        records[name] = [named[name] for named in values]
+    records = np.zeros(len(values), parameter_record(values))
+    for record, named in zip(records, values):
+        for name, value in named.items():
+            record[name] = value
     return records
 
 
