@@ -12,6 +12,7 @@ from ..accel.methods import HitTests
 from ..device.open import Selectors
 from ..errors import UsageError
 from ..float_errors import with_default_errors
+from ..scene.editing import materials_of, with_material
 from ..scene.geometry.ray_arrays import ray_arrays
 from ..scene.model import Scene
 from ..scene.ray_list import REPLICAS, RayList
@@ -92,15 +93,31 @@ def _measured(
         return Measurement(np.zeros((0, 3)), np.zeros((0, 3)))
     rays = RayList(origins=origins, directions=directions, receivers=receivers)
     settings = replace(
-        scene.render, size=rays.size, integrator="path", filter="box", adaptive=False, clamp_direct=0, clamp_indirect=0
+        scene.render,
+        size=rays.size,
+        integrator="path",
+        filter="box",
+        adaptive=False,
+        clamp_direct=0,
+        clamp_indirect=0,
+        transparent=False,
     )
     given = cast(RendererOptions, dict(options))
     if receivers:
         given["paths"] = "lanes"  # the other executions begin at the camera's rays
     # Without a planned number of samples each pixel has a sequence of its own, so that replicas are independent.
     spp = given.pop("spp", None)
-    renderer = Renderer(replace(scene, camera=rays, render=settings), **given)
+    renderer = Renderer(replace(_without_compositing(scene), camera=rays, render=settings), **given)
     for state in renderer.passes(spp=-(-(settings.spp if spp is None else spp) // REPLICAS)):
         pass
     means = state.film.mean.reshape(-1, REPLICAS, 3)[: len(origins)]
     return Measurement(means.mean(axis=1), means.std(axis=1, ddof=1) / np.sqrt(REPLICAS))
+
+
+def _without_compositing(scene: Scene) -> Scene:
+    """Return the scene with its environment as what is behind it, and with catchers as ordinary surfaces."""
+    for material in materials_of(scene).values():
+        if material.catcher:
+            scene = with_material(scene, material, replace(material, catcher=False))
+    seen = scene.environment if scene.environment.camera_visible else replace(scene.environment, camera_visible=True)
+    return replace(scene, backdrop=None, environment=seen)

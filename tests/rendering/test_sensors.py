@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -203,3 +204,21 @@ def test_arrays_that_are_no_rays(device: Device) -> None:
         clrt.radiance(scene, np.zeros((2, 2)), (0, 0, 1))
     with pytest.raises(UsageError, match="finite"):
         clrt.radiance(scene, (0, 0, math.nan), (0, 0, 1))
+
+
+def test_what_is_composited_is_not_measured(device: Device) -> None:
+    """Transparent images, backdrops, catchers and hidden environments leave the light as it is, to the last bit."""
+    ground = quad(np.array([-5.0, 0.0, 5.0]), np.array([10.0, 0.0, 0.0]), np.array([0.0, 0.0, -10.0]), (0.5, 0.6, 0.7))
+    plain = clrt.Scene(meshes=[ground], environment=clrt.Environment(color=(0.2, 0.4, 0.6)))
+    material = replace(ground.material, catcher=True)
+    composited = clrt.Scene(
+        meshes=[replace(ground, material=material)],
+        environment=clrt.Environment(color=(0.2, 0.4, 0.6), camera_visible=False),
+        backdrop=clrt.Backdrop(color=(9.0, 9.0, 9.0)),
+        render=clrt.RenderSettings(transparent=True),
+    )
+    rays = [(0.3, 1.0, 0.2), (0.1, 1.0, 0.0)], [(0.0, -1.0, 0.1), (0.2, 1.0, 0.0)]
+    for measure in (clrt.radiance, clrt.irradiance):
+        expected, found = (measure(scene, *rays, spp=64, device=device.info.index) for scene in (plain, composited))
+        assert expected.value.min() > 0.05
+        np.testing.assert_array_equal(found.value, expected.value)
