@@ -42,6 +42,7 @@ from clrt.scene.render_settings import Filter, Sampler
 from ..covering import others
 from ..rendering.lamps import lamps
 from ..rendering.test_variants import everything, painted, planted, shelf, sights
+from ..rendering.test_wavefront import catching
 
 KERNELS = Path(str(files("clrt.kernels")))
 FILES = sorted(str(path.relative_to(KERNELS)) for path in KERNELS.rglob("*.cl"))
@@ -142,7 +143,13 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
         used |= set(compile_scene(scene, Choices()).files)
     for count in (1, 40):
         used |= set(compile_scene(lamps(count), Choices()).files)
-    for scene in (painted(everything()), planted(everything()), shelf(), *(sight for _, sight in sights(everything()))):
+    for scene in (
+        painted(everything()),
+        planted(everything()),
+        catching(everything()),
+        shelf(),
+        *(sight for _, sight in sights(everything())),
+    ):
         used |= set(compile_scene(scene, Choices()).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
     for entry in (

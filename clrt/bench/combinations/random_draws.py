@@ -30,6 +30,8 @@ WIDE = {"roughness": (0.4, 1.0), "shininess": (0.0, 30.0), "angle_degrees": (30.
 DIM = 140
 #: Texels per side of a texture.
 TEXELS = 4
+#: Fields that make the image something else than the light of the scene.
+COMPOSITED = {"camera_visible", "catcher"}
 
 
 class Draws:
@@ -90,6 +92,8 @@ class Draws:
 
     def _field(self, hint: Any, field: Field[Any], specular: bool) -> Any:
         """Return a random value of a field; specular: whether it belongs to a material that is specular by default."""
+        if field.name in COMPOSITED:
+            return field.default
         narrow = self.moderate and field.name.endswith("roughness") and not specular
         if field.default is not MISSING and not narrow and self.chance(self._usual):
             return field.default
