@@ -22,7 +22,7 @@ from .renderer_options import SETTINGS, PictureOptions, RendererOptions, Tracing
 
 #: AOVs under the names that datasets have for them.
 IDS = {"instance_id": "object", "material_id": "material"}
-LAYERS = ("rgb", *AOVS, *IDS, "flow")
+LAYERS = ("rgb", "alpha", *AOVS, *IDS, "flow")
 #: AOVs that `flow` is computed from.
 FLOW_FROM = ("position", "object")
 
@@ -43,19 +43,22 @@ def each_view(
 ) -> Iterator[View]:
     """Render the scene from each camera in turn; BVHs and programs are kept, and memory does not grow.
 
-    layers: "rgb", linear Rec. 709, 3 channels; names of AOVs (docs/aovs.md), "instance_id" and "material_id" being
+    layers: "rgb", linear Rec. 709, 3 channels; "alpha", which makes the images transparent, and "rgb" premultiplied;
+    names of AOVs (docs/aovs.md), "instance_id" and "material_id" being
     "object" and "material"; "flow", 2 channels: how many pixels to the right and down what the pixel's center shows
     lies in the next view, NaN where nothing is hit, or where that view does not have it ahead, and in the last view.
     Without "rgb" and AOVs of light, no light is computed. Raises UsageError for other layers, or for flow between
     cameras without perspective, SceneError for a camera that cannot be used, and what `render` raises.
     """
     names = _chosen(layers)
-    aovs = {IDS.get(name, name): None for name in names if name not in ("rgb", "flow")}
+    aovs = {IDS.get(name, name): None for name in names if name not in ("rgb", "alpha", "flow")}
     aovs |= dict.fromkeys(FLOW_FROM) if "flow" in names else {}
     given = cast(RendererOptions, {**options, "aovs": list(aovs)})
-    lit = "rgb" in names or not set(aovs).isdisjoint(aovs_from("film"))
+    lit = not {"rgb", "alpha"}.isdisjoint(names) or not set(aovs).isdisjoint(aovs_from("film"))
     if not lit:
         given["integrator"] = "normals"  # its program is that of first hits alone
+    if "alpha" in names:
+        given["transparent"] = True
     renderer = None
     for number, (camera, following) in enumerate(_with_next(cameras)):
         try:
@@ -70,6 +73,7 @@ def each_view(
             for state in renderer.passes():
                 pass
             made |= renderer.aovs(state) | {"rgb": state.pixels}
+            made |= {} if state.alpha is None else {"alpha": state.alpha}
         if "flow" in names:
             made["flow"] = _flow(made["position"], np.greater_equal(made["object"], 0), following)
         shown = {name: made[IDS.get(name, name)] for name in names}

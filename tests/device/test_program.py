@@ -151,6 +151,9 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
         *(sight for _, sight in sights(everything())),
     ):
         used |= set(compile_scene(scene, Choices()).files)
+    for receivers in (False, True):
+        rays = RayList(origins=np.zeros((1, 3)), directions=np.ones((1, 3)), receivers=receivers)
+        used |= set(compile_scene(replace(everything(), camera=rays), Choices(paths="lanes")).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
     for entry in (
         "aov/denoiser_guides.cl",

@@ -158,3 +158,15 @@ def test_what_a_format_lacks_is_named(tmp_path: Path) -> None:
         clrt.save_views(tmp_path, SCENE, [View(view.camera, {"rgb": view.layers["rgb"]})], "coco")
     with pytest.raises(UsageError, match="view 0 has projection 'orthographic'"):
         clrt.save_views(tmp_path, SCENE, [View(replace(view.camera, projection="orthographic"), view.layers)])
+
+
+def test_colors_have_their_alpha(tmp_path: Path) -> None:
+    """A view's .png has it, and an .exr of a view without colors."""
+    pixels = np.full((*SIZE[::-1], 3), 0.25, np.float32)
+    alpha = np.full((*SIZE[::-1], 1), 0.5, np.float32)
+    clrt.save_views(tmp_path / "a", clrt.Scene(), [View(camera(0), {"rgb": pixels, "alpha": alpha})])
+    found = iio.imread(tmp_path / "a" / "images" / "view_00000.png")
+    assert found.shape == (*SIZE[::-1], 4) and found[0, 0].tolist() == [188, 188, 188, 128]  # the view of 0.25 / 0.5
+    assert list((tmp_path / "a" / "layers").iterdir()) == []
+    clrt.save_views(tmp_path / "b", clrt.Scene(), [View(camera(0), {"alpha": alpha})])
+    assert (tmp_path / "b" / "layers" / "view_00000.exr").is_file()

@@ -37,6 +37,15 @@ def test_each_view_is_that_of_a_render_of_its_own(device: Device) -> None:
             np.testing.assert_array_equal(arrays[name][number].reshape(expected.shape), expected)
 
 
+def test_alpha_makes_views_transparent(device: Device) -> None:
+    scene = clrt.load(SCENES / "spot.toml")
+    options: dict[str, Any] = {"size": SIZE, "spp": 4, "device": device.info.index}
+    found = clrt.render_views(scene, [scene.camera], ["rgb", "alpha"], **options)
+    expected = clrt.render(scene, transparent=True, **options)
+    assert expected.alpha is not None and 0 < expected.alpha.mean() < 1
+    np.testing.assert_array_equal(np.concatenate([found["rgb"][0], found["alpha"][0]], axis=2), expected.layers)
+
+
 def test_without_light_the_layers_are_the_same(device: Device) -> None:
     scene = clrt.load(SCENES / "textures.toml")
     options: dict[str, Any] = {"size": SIZE, "spp": 1, "device": device.info.index}

@@ -1,4 +1,4 @@
-"""Files of one view: its colors as .png, and its other layers as channels of one .exr."""
+"""Files of one view: its colors as .png, with its alpha if it has one, and its other layers as channels of one .exr."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..images import write_channels, write_image
 
 Layers = Mapping[str, NDArray[Any]]
 #: Channel names of layers that are no AOVs.
-OTHER_CHANNELS = {"instance_id": "X", "material_id": "X", "flow": "UV"}
+OTHER_CHANNELS = {"alpha": "A", "instance_id": "X", "material_id": "X", "flow": "UV"}
 
 
 class SavedView(NamedTuple):
@@ -31,10 +31,11 @@ class SavedView(NamedTuple):
 
 def save_view(folder: Path, name: str, camera: Camera, layers: Layers) -> SavedView:
     """Write the layers (height, width, channels) of one view."""
-    others = {key: layer for key, layer in layers.items() if key != "rgb"}
+    colors = [name for name in ("rgb", "alpha") if "rgb" in layers and name in layers]
+    others = {key: layer for key, layer in layers.items() if key not in colors}
     image, layers_file = f"images/{name}.png" if "rgb" in layers else "", f"layers/{name}.exr" if others else ""
     if image:
-        write_image(folder / image, layers["rgb"].astype(np.float32))
+        write_image(folder / image, np.concatenate([layers[name] for name in colors], axis=2, dtype=np.float32))
     if others:
         channels = [channel for key in others for channel in _channels(key)]
         samples = np.concatenate([layer.astype(np.float32) for layer in others.values()], axis=2)

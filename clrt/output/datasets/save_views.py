@@ -42,8 +42,8 @@ def save_views(
 ) -> Path:
     """Write the views of `each_view`, as they come, to a folder; return it.
 
-    Each view's "rgb" is images/view_00000.png, through the view transform srgb, and its other layers are channels of
-    layers/view_00000.exr. formats, one or several:
+    Each view's "rgb", with its "alpha", is images/view_00000.png, through the view transform srgb, and its other layers
+    are channels of layers/view_00000.exr. formats, one or several:
 
     - "nerf": transforms.json, as instant-ngp and nerfstudio read it
     - "colmap": sparse/0/cameras.txt, images.txt and points3D.txt, whose points are of the layers "position" and "rgb"
