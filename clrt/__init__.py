@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from . import trimesh
     from .api import animate as animate, load as load, render as render
+    from .baking.bake import bake as bake
+    from .baking.light_map import LightMap as LightMap
     from .device.discovery.discover import devices as devices
     from .errors import (
         CheckpointError as CheckpointError,
@@ -33,7 +35,11 @@ if TYPE_CHECKING:
     from .queries.instanced import InstancedRayQuery as InstancedRayQuery
     from .queries.mesh import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
-    from .rendering.sensors import irradiance as irradiance, radiance as radiance
+    from .rendering.sensors import (
+        ambient_occlusion as ambient_occlusion,
+        irradiance as irradiance,
+        radiance as radiance,
+    )
     from .rendering.views import each_view as each_view, render_views as render_views
     from .scene.animation import Animation as Animation, Keyframe as Keyframe
     from .scene.camera_path import frames as frames, turntable as turntable
@@ -73,6 +79,8 @@ if TYPE_CHECKING:
 
 _HOME = {
     "api": ("animate", "load", "render"),
+    "baking.bake": ("bake",),
+    "baking.light_map": ("LightMap",),
     "device.discovery.discover": ("devices",),
     "errors": ("CheckpointError", "ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
     "queries.instanced": ("InstancedRayQuery",),
@@ -83,7 +91,7 @@ _HOME = {
     "output.scenes": ("save_scene",),
     "queries.mesh": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
-    "rendering.sensors": ("irradiance", "radiance"),
+    "rendering.sensors": ("ambient_occlusion", "irradiance", "radiance"),
     "rendering.views": ("each_view", "render_views"),
     "scene.animation": ("Animation", "Keyframe"),
     "scene.camera_path": ("frames", "turntable"),

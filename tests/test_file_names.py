@@ -62,6 +62,9 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "Renderer checkpoint": lambda new_ck: list(
         clrt.Renderer(clrt.Scene(spheres=[clrt.Sphere()]), spp=1, size=(8, 8), checkpoint=new_ck).passes()
     ),
+    "LightMap.save path": lambda new_png: clrt.LightMap(
+        np.ones((8, 8, 3), np.float32), np.zeros((8, 8, 3), np.float32), np.ones((8, 8), bool), {"what": "occlusion"}
+    ).save(new_png),
     "save_views folder": lambda new: clrt.save_views(
         new, clrt.Scene(), clrt.each_view(clrt.Scene(), [clrt.Camera()], "depth", size=(8, 8))
     ),

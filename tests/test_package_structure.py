@@ -31,6 +31,7 @@ ROOMS = [
     "rendering",
     "check",
     "output",
+    "baking",
     "bench",
     "debug",
     "api",

@@ -55,10 +55,12 @@ def black_warnings(settings: RenderSettings, features: Iterable[str], brightest:
 
 
 class PictureWarnings:
-    """Warnings about the renders of one scene. features: those of its program."""
+    """Warnings about the renders of one scene. features: those of its program; before: of a previous scene, whose
+    warnings are not logged again."""
 
-    def __init__(self, scene: Scene, features: Iterable[str]) -> None:
-        self._scene, self._features, self._logged = scene, list(features), set[str]()
+    def __init__(self, scene: Scene, features: Iterable[str], before: PictureWarnings | None = None) -> None:
+        self._scene, self._features = scene, list(features)
+        self._logged: set[str] = set(before._logged) if before else set()
         self._backward = backward_emitters(scene) if _shows_light(scene.render) else []
         self._of_scene = [
             f'the emissive mesh "{name}" emits light only away from the scene; reverse the order of its '
@@ -71,8 +73,7 @@ class PictureWarnings:
             self._of_scene.append(
                 "what catchers catch is not visible on black; add transparent = true to [render], or a [backdrop]"
             )
-        for text in self._of_scene:
-            _log.warning("%s: %s", scene.name, text)
+        self._log_new(self._of_scene)
 
     def of(self, film: Film) -> list[str]:
         """Return all warnings for the image so far, one line each; for a band of an image only those of the scene."""
@@ -80,10 +81,14 @@ class PictureWarnings:
 
     def log(self, film: Film) -> None:
         """Log the warnings of a finished image that were not logged for the scene or for previous images."""
-        for text in self._of_film(film):
-            if text not in self._logged:
-                _log.warning("%s: %s", self._scene.name, text)
-            self._logged.add(text)
+        self._log_new(self._of_film(film))
+
+    def _log_new(self, texts: Iterable[str]) -> None:
+        for text in texts:
+            named = f"{self._scene.name}: {text}"
+            if named not in self._logged:
+                _log.warning("%s", named)
+            self._logged.add(named)
 
     def _of_film(self, film: Film) -> list[str]:
         settings = self._scene.render

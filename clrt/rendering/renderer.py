@@ -78,7 +78,9 @@ class Renderer:
         on_phase("build")
         self._compiler: SceneCompiler = SceneCompiler.after(before._compiler if before else None, self.devices)
         self._compiled = self._compiler.compile(self.scene, self.choices, ahead=len(self.devices) == 1)
-        self.warnings = PictureWarnings(self.scene, self.compiled.features)
+        self.warnings: PictureWarnings = PictureWarnings(
+            self.scene, self.compiled.features, before.warnings if before else None
+        )
 
     def _new_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
         """Return an image without samples, or a band of it, over its backdrop."""

@@ -1,9 +1,8 @@
-"""Measurements of light at chosen places: radiance along rays, and irradiance at points of surfaces."""
+"""Measurements of light at chosen places: radiance along rays, irradiance and ambient occlusion at points."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Annotated, NamedTuple, Unpack, cast
+from typing import Annotated, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,23 +11,15 @@ from ..accel.methods import HitTests
 from ..device.open import Selectors
 from ..errors import UsageError
 from ..float_errors import with_default_errors
-from ..scene.editing import materials_of, with_material
 from ..scene.geometry.ray_arrays import ray_arrays
 from ..scene.model import Scene
-from ..scene.ray_list import REPLICAS, RayList
+from ..scene.ray_list import RayList
 from ..scene.render_settings import RenderSettings, Sampler
 from ..scene.validation.validate import check_is_scene
 from .compile.choices import Choices
+from .light_meter import LightMeter, Measurement
 from .listed_keywords import listed
-from .renderer import Renderer
-from .renderer_options import RendererOptions, TracingOptions
-
-
-class Measurement(NamedTuple):
-    """Linear Rec. 709 values (n, 3) float64, and the standard errors of each."""
-
-    value: NDArray[np.float64]
-    standard_error: NDArray[np.float64]
+from .renderer_options import TracingOptions
 
 
 class SensorOptions(TracingOptions, total=False):
@@ -50,7 +41,8 @@ def radiance(scene: Scene, origins: ArrayLike, directions: ArrayLike, **options:
     there would see. Standard errors are those of 16 independent estimates, so 99.1 % of the errors are below three of
     them (Student's t, 15 degrees of freedom). Raises UsageError for other arrays, and what `render` raises.
     """
-    return _measured(scene, *_rays(origins, directions, "directions"), False, options)
+    starts, ways = _rays(origins, directions, "directions")
+    return _measured(scene, RayList(origins=starts, directions=ways), options)
 
 
 @listed(SensorOptions, (RenderSettings, Choices, HitTests))
@@ -63,8 +55,44 @@ def irradiance(scene: Scene, points: ArrayLike, normals: ArrayLike, **options: U
     surface at the point itself casts no shadow. In the scene's unit of radiance, times sr. Standard errors and
     exceptions: as in `radiance`.
     """
-    value, error = _measured(scene, *_rays(points, normals, "normals"), True, options)
+    places, ways = _rays(points, normals, "normals")
+    rays = RayList(origins=places, directions=ways, surface_normals=ways, measures="irradiance")
+    value, error = _measured(scene, rays, options)
     return Measurement(np.pi * value, np.pi * error)
+
+
+@listed(SensorOptions, (RenderSettings, Choices, HitTests))
+@with_default_errors
+def ambient_occlusion(
+    scene: Scene,
+    points: ArrayLike,
+    normals: ArrayLike,
+    distance: float | None = None,
+    **options: Unpack[SensorOptions],
+) -> Measurement:
+    """Measure ambient occlusion at points of surfaces, from 0, closed, to 1, open.
+
+    It is the fraction of the hemisphere around the normal, weighted by the cosine, in which no surface is nearer than
+    `distance` (None: at any distance). Values and standard errors are (n,). Points, normals, standard errors and
+    exceptions: as in `irradiance`; UsageError also for a distance that is not above 0.
+    """
+    places, ways = _rays(points, normals, "normals")
+    rays = RayList(
+        origins=places,
+        directions=ways,
+        surface_normals=ways,
+        measures="ambient_occlusion",
+        reach=reach_of(distance),
+    )
+    value, error = _measured(scene, rays, options)
+    return Measurement(value[:, 0], error[:, 0])
+
+
+def reach_of(distance: float | None) -> float:
+    """Return the reach of a RayList, 0 for any distance. Raises UsageError for a distance that is not above 0."""
+    if distance is not None and not 0 < distance < np.inf:
+        raise UsageError(f"distance is {distance!r}; give a finite number above 0, or None for any distance")
+    return distance or 0.0
 
 
 def _rays(origins: ArrayLike, directions: ArrayLike, name: str) -> tuple[NDArray[np.floating], NDArray[np.float32]]:
@@ -81,43 +109,10 @@ def _rays(origins: ArrayLike, directions: ArrayLike, name: str) -> tuple[NDArray
     return starts, (ways / lengths[:, None]).astype(np.float32)
 
 
-def _measured(
-    scene: Scene,
-    origins: NDArray[np.floating],
-    directions: NDArray[np.float32],
-    receivers: bool,
-    options: SensorOptions,
-) -> Measurement:
+def _measured(scene: Scene, rays: RayList, options: SensorOptions) -> Measurement:
     check_is_scene(scene)
-    if not len(origins):
-        return Measurement(np.zeros((0, 3)), np.zeros((0, 3)))
-    rays = RayList(origins=origins, directions=directions, receivers=receivers)
-    settings = replace(
-        scene.render,
-        size=rays.size,
-        integrator="path",
-        filter="box",
-        adaptive=False,
-        clamp_direct=0,
-        clamp_indirect=0,
-        transparent=False,
-    )
-    given = cast(RendererOptions, dict(options))
-    if receivers:
-        given["paths"] = "lanes"  # the other executions begin at the camera's rays
-    # Without a planned number of samples each pixel has a sequence of its own, so that replicas are independent.
-    spp = given.pop("spp", None)
-    renderer = Renderer(replace(_without_compositing(scene), camera=rays, render=settings), **given)
-    for state in renderer.passes(spp=-(-(settings.spp if spp is None else spp) // REPLICAS)):
-        pass
-    means = state.film.mean.reshape(-1, REPLICAS, 3)[: len(origins)]
-    return Measurement(means.mean(axis=1), means.std(axis=1, ddof=1) / np.sqrt(REPLICAS))
-
-
-def _without_compositing(scene: Scene) -> Scene:
-    """Return the scene with its environment as what is behind it, and with catchers as ordinary surfaces."""
-    for material in materials_of(scene).values():
-        if material.catcher:
-            scene = with_material(scene, material, replace(material, catcher=False))
-    seen = scene.environment if scene.environment.camera_visible else replace(scene.environment, camera_visible=True)
-    return replace(scene, backdrop=None, environment=seen)
+    measured = Measurement(np.zeros((0, 3)), np.zeros((0, 3)))
+    if len(rays.origins):
+        for _, measured in LightMeter(scene, options).measure(rays):
+            pass
+    return measured

@@ -16,7 +16,13 @@
 #include "core/vector.cl"
 #include FILTER
 
-typedef struct { real3 origin, direction; } CameraRay;   // direction: unit
+typedef struct {
+    real3 origin, direction;   // direction: unit
+#if ON_SURFACES
+    real3 surface_normal;
+    real reach;                // 0: without limit
+#endif
+} CameraRay;
 
 #include CAMERA
 

@@ -36,7 +36,7 @@ from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.geometry import instancing
 from clrt.scene.materials.material_types import MATERIALS
 from clrt.scene.model import Environment, Scene, Sphere
-from clrt.scene.ray_list import RayList
+from clrt.scene.ray_list import Measured, RayList
 from clrt.scene.render_settings import Filter, Sampler
 
 from ..covering import others
@@ -135,8 +135,6 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     for paths in get_args(Paths):
         used |= set(compile_scene(everything(), Choices(paths=paths)).files)
     used |= set(compile_scene(Scene(spheres=[Sphere()]), Choices(paths="queues")).files)  # no microfacets
-    rays = RayList(origins=np.zeros((1, 3)), directions=np.array([[0.0, 1.0, 0.0]], np.float32), receivers=True)
-    used |= set(compile_scene(replace(everything(), camera=rays), Choices(paths="lanes")).files)
     for sampler, name in zip(get_args(Sampler), get_args(Filter)):
         scene = everything()
         scene.render = replace(scene.render, sampler=sampler, filter=name)
@@ -151,9 +149,6 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
         *(sight for _, sight in sights(everything())),
     ):
         used |= set(compile_scene(scene, Choices()).files)
-    for receivers in (False, True):
-        rays = RayList(origins=np.zeros((1, 3)), directions=np.ones((1, 3)), receivers=receivers)
-        used |= set(compile_scene(replace(everything(), camera=rays), Choices(paths="lanes")).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
     for entry in (
         "aov/denoiser_guides.cl",
@@ -170,6 +165,10 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     ):
         compiled = compile_scene(everything(), Choices())
         used |= set(replace(compiled, chosen_files=compiled.chosen_files | {name: [f"bench/{file}.cl"]}).files)
+    for measured in get_args(Measured):
+        place = np.ones((1, 3), np.float32)
+        rays = RayList(origins=place, directions=place, surface_normals=place, measures=measured)
+        used |= set(compile_scene(replace(everything(), camera=rays), Choices(paths="lanes")).files)
     assert sorted(used) == FILES
 
 

@@ -15,7 +15,8 @@ from scipy.stats import binom, t
 import clrt
 from clrt.device.open import Device
 from clrt.errors import UsageError
-from clrt.rendering.sensors import Measurement, SensorOptions
+from clrt.rendering.light_meter import Measurement
+from clrt.rendering.sensors import SensorOptions
 from clrt.scene.ray_list import REPLICAS
 from clrt.scene.render_settings import Sampler
 
@@ -195,6 +196,52 @@ def test_a_daylight_factor_by_hand(device: Device) -> None:
     assert error < 2e-4 and factor == pytest.approx(by_hand, abs=4 * error)
 
 
+def test_ambient_occlusion_by_a_wall(device: Device) -> None:
+    """A wall of height h at distance d hides (1 − d/√(d² + h²))/2 of the sky. Directions within a distance r of an
+    endless wall have a cosine above c = d/r with its normal: half the disc's segment beyond c, as they end above the
+    floor, (acos c − c √(1 − c²)) / π of the disc's area, all of which lies above it."""
+    random = np.random.default_rng(todays_seed())
+    far, high = 1e4, 3.0
+    base, along = np.array([1.0, 0, -far]), np.array([0, 0, 2 * far])
+    points, up = random.uniform(-4, 0.9, (500, 3)) * [1, 0, 1], (0, 1, 0)
+    away = 1 - points[:, 0]
+    points[(away > 2.2) & (away < 2.5), 0] = 0  # too little of the wall for 256 samples to hit
+    away = 1 - points[:, 0]
+    options = SensorOptions(spp=256, device=device.info.index)
+    low = clrt.Scene(meshes=[quad(base, along, np.array([0, high, 0]))], environment=BLACK)
+    seen = clrt.ambient_occlusion(low, points, up, **options)
+    expected = 1 - (1 - away / np.hypot(away, high)) / 2
+    check_within_three_standard_errors(Measurement(*(each[:, None] for each in seen)), expected[:, None])
+    endless = clrt.Scene(meshes=[quad(base, along, np.array([0, far, 0]))], environment=BLACK)
+    near = clrt.ambient_occlusion(endless, points, up, distance=2.5, **options)
+    c = np.minimum(away / 2.5, 1)
+    expected = 1 - (np.arccos(c) - c * np.sqrt(1 - c**2)) / np.pi
+    check_within_three_standard_errors(Measurement(*(each[:, None] for each in near)), expected[:, None])
+    assert (near.value[away > 2.5] == 1).all() and not near.standard_error[away > 2.5].any()
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1, 1e6])
+def test_ambient_occlusion_under_a_disc(device: Device, scale: float) -> None:
+    """A parallel disc of radius r at height h hides r²/(r² + h²), in scenes of any size; with half an alpha, half."""
+    angles = np.linspace(0, 2 * np.pi, 4097)[:-1]
+    rim = np.stack([np.cos(angles), np.zeros_like(angles), np.sin(angles)], axis=1)
+    vertices = (np.concatenate([[[0, 0, 0]], rim]) * 1.5 + [0, 2, 0]) * scale
+    number = np.arange(1, 4097)
+    faces = np.stack([np.zeros_like(number), number, np.roll(number, -1)], axis=1)
+    hidden = 1.5**2 / (1.5**2 + 2**2)
+    for opacity in (1.0, 0.5):
+        disc = clrt.Mesh(
+            vertices=vertices.astype(np.float32), faces=faces.astype(np.int32), material=clrt.Diffuse(opacity=opacity)
+        )
+        scene = clrt.Scene(meshes=[disc], environment=BLACK)
+        for distance, part in ((None, hidden), (1.9 * scale, 0.0), (3 * scale, hidden)):
+            seen = clrt.ambient_occlusion(
+                scene, (0, 0, 0), (0, 1, 0), distance=distance, spp=1 << 14, device=device.info.index
+            )
+            limit = 6 * seen.standard_error[0] + 1e-5
+            assert limit < 0.02 and seen.value[0] == pytest.approx(1 - opacity * part, abs=limit)
+
+
 def test_arrays_that_are_no_rays(device: Device) -> None:
     scene = clrt.Scene(environment=BLACK)
     assert clrt.radiance(scene, np.zeros((0, 3)), np.zeros((0, 3))).value.shape == (0, 3)
@@ -204,6 +251,8 @@ def test_arrays_that_are_no_rays(device: Device) -> None:
         clrt.radiance(scene, np.zeros((2, 2)), (0, 0, 1))
     with pytest.raises(UsageError, match="finite"):
         clrt.radiance(scene, (0, 0, math.nan), (0, 0, 1))
+    with pytest.raises(UsageError, match="distance is 0; give a finite number above 0"):
+        clrt.ambient_occlusion(scene, (0, 0, 0), (0, 0, 1), distance=0)
 
 
 def test_what_is_composited_is_not_measured(device: Device) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...device.programs.preamble import Buffers
 from ...scene.cameras import Camera, View
-from ...scene.ray_list import REPLICAS, RayList
+from ...scene.ray_list import RayList
 from .records import LAUNCH, LISTED_RAY
 
 #: Camera fields of the LAUNCH record.
@@ -27,16 +27,21 @@ def camera_buffers(camera: Camera) -> Buffers:
     if not isinstance(camera, RayList):
         return {}
     width, height = camera.size
-    rays = np.zeros(width * height // REPLICAS, LISTED_RAY)
+    rays, count = np.zeros(width * height // camera.replicas, LISTED_RAY), len(camera.origins)
     rays["direction"] = camera.directions[0]
-    rays["origin"][: len(camera.origins)] = camera.origins
-    rays["direction"][: len(camera.origins)] = camera.directions
+    rays["origin"][:count] = camera.origins
+    rays["direction"][:count] = camera.directions
+    if camera.on_surfaces:
+        rays["surface_normal"][:count] = camera.surface_normals
+        rays["reach"] = camera.reach
     return {"listed_rays": ("ListedRay", rays)}
 
 
 def camera_defines(camera: Camera) -> dict[str, int]:
     """Return the macros that its kernel file reads."""
-    return {"REPLICAS": REPLICAS} if isinstance(camera, RayList) else {}
+    if not isinstance(camera, RayList):
+        return {}
+    return {"REPLICAS": camera.replicas, **({"ON_SURFACES": 1} if camera.on_surfaces else {})}
 
 
 def launch_record(camera: Camera, size: tuple[int, int], kind: np.dtype[Any] = LAUNCH) -> NDArray[Any]:

@@ -20,6 +20,7 @@ from ...scene.geometry.scaling import SceneFrame, camera_in
 from ...scene.model import Camera, Scene
 from ...scene.validation.validate import validate
 from ..film.tiles import TILE_PIXELS
+from .camera_kernel import camera_buffers
 from .choices import Choices, ResolvedChoices
 from .compile_ahead import begin_program
 from .features import WITH_LIGHT, features_of, files_for, preamble_of
@@ -76,7 +77,13 @@ class CompiledScene:
 
     def seen_by(self, camera: Camera, file: str) -> CompiledScene:
         """Return the same scene with another camera, whose kernel file is `file` (see `camera_file`)."""
-        return replace(self, camera=camera_in(camera, self.frame), chosen_files={**self.chosen_files, "CAMERA": [file]})
+        camera = camera_in(camera, self.frame)
+        return replace(
+            self,
+            camera=camera,
+            buffers={**self.buffers, **camera_buffers(camera)},
+            chosen_files={**self.chosen_files, "CAMERA": [file]},
+        )
 
     def has_text_of(self, other: CompiledScene) -> bool:
         """Return whether both have the same program, with arrays split into the same parts."""

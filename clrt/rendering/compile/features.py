@@ -154,8 +154,8 @@ def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict
 
 
 def _integrator_file(scene: Scene) -> str:
-    if isinstance(scene.camera, RayList) and scene.camera.receivers:
-        return "integrator/irradiance.cl"
+    if isinstance(scene.camera, RayList) and scene.camera.on_surfaces:
+        return f"integrator/{scene.camera.measures}.cl"
     return INTEGRATORS.get(scene.render.integrator, "integrator/first_surface.cl")
 
 

@@ -90,7 +90,7 @@ LAUNCH = record(
     clamp_indirect="f4",
 )
 #: A ray of a RayList (kernels/camera/listed_rays.cl).
-LISTED_RAY = record(origin="3f4", pad0="i4", direction="3f4", pad1="i4")
+LISTED_RAY = record(origin="3f4", reach="f4", direction="3f4", pad0="i4", surface_normal="3f4", pad1="i4")
 #: u_row, v_row: rows that map (u, v, 1) to the image's coordinates. first: of its texels.
 TEXTURE = record(
     u_row="3f4",

@@ -1,0 +1,1 @@
+"""Baking: light and ambient occlusion of a mesh into an image over its texture coordinates."""
