@@ -17,6 +17,7 @@ PAGES = {
     "rays": (4, ()),
     "transparent-background": (2, ("product.png", "product.exr")),
     "light-measurements": (2, ()),
+    "bake": (3, ("light.exr", "light.png", "light.json", "occlusion.png", "table.exr")),
     "sky": (2, ("noon.png", "outside.toml", "hour_09.png", "hour_21.png")),
     "dataset": (4, ("view_0003.exr", "spot/transforms.json", "spot/images/view_00003.png")),
 }

@@ -7,13 +7,15 @@ import os
 import sys
 from collections.abc import Iterable
 from contextlib import suppress
+from math import floor
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from .goal import Goal, duration
-from .progress_reporter import PHASES, Progress, describe_workers, figures, where
+from .progress_reporter import PHASES, Progress, bake_figures, bake_left, describe_workers, figures, where
 
 if TYPE_CHECKING:
+    from ..baking.bake import BakeState
     from ..rendering.renderer import State
 
 #: Width of the bar in characters, and default number of terminal columns if it is unknown.
@@ -107,6 +109,12 @@ class BarProgress(Progress):
 
     def bands(self, done: int, count: int) -> None:
         self._line.show([PHASES["render"], f"{done} of {count} bands", bar(done / count)])
+
+    def bake(self, state: BakeState) -> None:
+        percent, told = f"{floor(100 * state.done)} %", bake_figures(state)
+        self._ended = [percent, *told]
+        left = f"{duration(bake_left(state))} left"
+        self._line.show([PHASES["bake"], percent, bar(state.done), left, *told, self._where])
 
     def __enter__(self) -> Progress:
         stdout, stderr = self._streams

@@ -23,6 +23,16 @@ class Size(click.ParamType[tuple[int, int]]):
         return int(match[1]), int(match[2])
 
 
+class TexelSize(Size):
+    """WIDTHxHEIGHT in texels, or one number for a square, e.g. 1024."""
+
+    name = "N"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
+        text = str(value)
+        return super().convert(f"{text}x{text}" if text.isdecimal() else text, param, context)
+
+
 class Pixel(click.ParamType[tuple[int, int]]):
     """X,Y of a pixel, e.g. 120,64."""
 

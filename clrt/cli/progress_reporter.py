@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from math import floor
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from .goal import FrameSpeed, Goal, RenderSpeed, duration, time_left
 from .streams import tell
 
 if TYPE_CHECKING:
+    from ..baking.bake import BakeState
     from ..rendering.renderer import State
 
 PHASES = {
@@ -19,6 +21,7 @@ PHASES = {
     "build": "building the BVH",
     "compile": "compiling the kernel",
     "render": "rendering",
+    "bake": "baking",
     "write": "writing",
     "denoise": "denoising",
 }
@@ -59,6 +62,9 @@ class Progress:
     def bands(self, done: int, count: int) -> None:
         """Show how many bands of a large image are finished."""
 
+    def bake(self, state: BakeState) -> None:
+        """Show a state of a bake."""
+
     def __enter__(self) -> Progress:
         return self
 
@@ -87,6 +93,10 @@ class PlainProgress(Progress):
         if done != self._bands:
             tell(f"{done} of {count} bands")
         self._bands = done
+
+    def bake(self, state: BakeState) -> None:
+        percent, left = f"{floor(100 * state.done):3} %", f"about {duration(bake_left(state))} left"
+        tell("  ".join([percent, *bake_figures(state), left]))
 
 
 class JsonProgress(Progress):
@@ -139,6 +149,9 @@ class JsonProgress(Progress):
             _tell_json({"phase": "render", "bands": done, "of": count})
         self._bands = done
 
+    def bake(self, state: BakeState) -> None:
+        _tell_json({"phase": "bake", **state._asdict(), "seconds_left": bake_left(state)})
+
 
 def _tell_json(values: dict[str, Any]) -> None:
     from ..output.json_text import json_text  # imports numpy, which is being loaded in another thread
@@ -172,6 +185,17 @@ def figures(state: State, rate: float) -> list[str]:
     if state.relmse is not None:
         told.append(f"relMSE {state.relmse:.3g}")
     return told
+
+
+def bake_figures(state: BakeState) -> list[str]:
+    """Return samples per texel, errors and time of a bake."""
+    error = f"standard error {state.standard_error:.3g} ({100 * state.noise:.2g} %)"
+    return [f"{state.spp:.0f} spp", error, f"{state.seconds:.1f} s"]
+
+
+def bake_left(state: BakeState) -> float:
+    """Return the seconds until a bake ends, if the rest is as fast."""
+    return state.seconds * (1 - state.done) / max(state.done, 1e-9)
 
 
 def describe_workers(workers: list[dict[str, Any]]) -> str:
