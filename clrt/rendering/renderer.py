@@ -132,7 +132,7 @@ class Renderer:
     def look(self, camera: Camera) -> None:
         """Start a new image from this camera, bit-identical to the one that a new renderer would produce.
 
-        BVH and buffers are reused; so is the program, unless the camera model changes (projection, thin lens). Raises
+        BVH and buffers are reused; so is the program, unless the camera model changes (projection, lens). Raises
         SceneError if the camera is invalid, and UsageError if a checkpoint is written, as it belongs to one image.
         """
         check_of_none(self._checkpoints)

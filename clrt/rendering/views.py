@@ -13,6 +13,7 @@ from ..aov_types import aovs_from
 from ..device.open import Selectors
 from ..errors import SceneError, UsageError, did_you_mean
 from ..float_errors import with_default_errors
+from ..scene.cameras import CALIBRATED
 from ..scene.model import Camera, Scene
 from ..scene.view import View
 from .aovs import AOVS
@@ -46,9 +47,9 @@ def each_view(
     layers: "rgb", linear Rec. 709, 3 channels; "alpha", which makes the images transparent, and "rgb" premultiplied;
     names of AOVs (docs/aovs.md), "instance_id" and "material_id" being
     "object" and "material"; "flow", 2 channels: how many pixels to the right and down what the pixel's center shows
-    lies in the next view, NaN where nothing is hit, or where that view does not have it ahead, and in the last view.
+    lies in the next view, NaN where nothing is hit, or where that view's lens does not image it, and in the last view.
     Without "rgb" and AOVs of light, no light is computed. Raises UsageError for other layers, or for flow between
-    cameras without perspective, SceneError for a camera that cannot be used, and what `render` raises.
+    cameras neither perspective nor fisheye, SceneError for a camera that cannot be used, and what `render` raises.
     """
     names = _chosen(layers)
     aovs = {IDS.get(name, name): None for name in names if name not in ("rgb", "alpha", "flow")}
@@ -127,12 +128,11 @@ def _flow(position: NDArray[Any], hit: NDArray[np.bool_], following: Camera | No
     height, width = hit.shape
     if following is None:
         return np.full((height, width, 2), np.nan, np.float32)
-    if following.projection != "perspective":
-        raise UsageError(f"flow is between perspective cameras, and one is {following.projection}; leave it out")
-    pose = following.world_to_camera
-    points = position.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
-    ahead = np.where(hit & (points[..., 2] > 0), points[..., 2], np.nan)
-    places = points @ following.matrix((width, height)).T
+    if following.projection not in CALIBRATED:
+        raise UsageError(
+            f"flow is between perspective and fisheye cameras, and one is {following.projection}; leave it out"
+        )
+    places = np.where(hit[..., None], following.project(position, (width, height)), np.nan)
     centers = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
-    flow: NDArray[np.float32] = (places[..., :2] / ahead[..., None] - centers).astype(np.float32)
+    flow: NDArray[np.float32] = (places - centers).astype(np.float32)
     return flow

@@ -18,7 +18,7 @@ AXES: dict[Convention, tuple[float, float, float]] = {"opencv": (1.0, 1.0, 1.0),
 RIGID = 1e-4
 
 
-def intrinsics_of(K: ArrayLike, size: tuple[int, int], first_pixel: float) -> dict[str, Any]:
+def intrinsics_of(K: ArrayLike, size: tuple[int, int], first_pixel: float, fisheye: bool) -> dict[str, Any]:
     """Return the fields of Camera for an intrinsic matrix (3, 3), see `Camera.from_matrix`. Raises UsageError."""
     matrix = _finite("K", K)
     width, height = size
@@ -28,12 +28,22 @@ def intrinsics_of(K: ArrayLike, size: tuple[int, int], first_pixel: float) -> di
     if not (fx > 0 and fy > 0):
         raise UsageError(f"K has the focal lengths {fx:g} and {fy:g}; they must be above 0, with y downwards")
     cx, cy = cx + 0.5 - first_pixel, cy + 0.5 - first_pixel
+    half = height / 2 / fy if fisheye else np.arctan(height / 2 / fy)
     return {
-        "fov_degrees": float(np.degrees(2 * np.arctan(height / 2 / fy))),
+        "fisheye_degrees" if fisheye else "fov_degrees": float(np.degrees(2 * half)),
         "lens_shift": (float(0.5 - cx / width), float(cy / height - 0.5)),
         "pixel_aspect": float(fy / fx),
         "skew": float(skew / fx),
     }
+
+
+def coefficients_of(distortion: ArrayLike, counts: tuple[int, ...]) -> tuple[float, ...]:
+    """Return OpenCV's distortion coefficients, a vector, a row or a column; counts: how many it may have. Raises
+    UsageError."""
+    found = _finite("distortion", distortion).ravel()
+    if found.size and found.size not in counts:
+        raise UsageError(f"distortion has {found.size} coefficients; it must have {' or '.join(map(str, counts))}")
+    return tuple(found.tolist())
 
 
 def pose_of(

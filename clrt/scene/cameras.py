@@ -12,14 +12,17 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import UsageError
 from .animation import Positive, Vector
-from .camera_matrices import Convention, intrinsics_of, pose_of, world_to_camera_of
+from .camera_matrices import Convention, coefficients_of, intrinsics_of, pose_of, world_to_camera_of
 from .fields.limits import Gt, Lt
 from .fields.tuples import tuples_for_lists
+from .lens_model import BROWN_CONRADY, FISHEYE, LensModel
 from .materials.textures import NonNegative
 
 Doubles = NDArray[np.float64]
-Projection = Literal["perspective", "orthographic", "equirectangular"]
+Calibrated = Literal["perspective", "fisheye"]
+Projection = Literal["perspective", "orthographic", "equirectangular", "fisheye"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,9 +34,15 @@ class Camera:
     - "perspective": pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
       `look_at`); `fov_degrees`: vertical, full angle. For calibrated cameras, see `from_matrix`: `lens_shift`, the
       image's center from the optical axis, to the right and up, in widths and heights of the image; `pixel_aspect`, a
-      pixel's width over its height, fy / fx; `skew`, K[0, 1] / K[0, 0].
+      pixel's width over its height, fy / fx; `skew`, K[0, 1] / K[0, 0]; `distortion`, OpenCV's coefficients k1, k2, p1,
+      p2, k3, k4, k5, k6, the first 4, 5 or all of them.
     - "orthographic": parallel rays, an image `view_height` high (None: as the perspective view at `look_at`).
     - "equirectangular": all directions, in Environment's mapping for a view along +Z.
+    - "fisheye": the distance from the optical axis is proportional to the angle θ from it, `fisheye_degrees` over the
+      image's height, or to θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) with `distortion` k1, k2, k3, k4, OpenCV's fisheye
+      model; `lens_shift`, `pixel_aspect` and `skew` as above.
+
+    A pixel that a lens with distortion does not image, beyond the radius where the model folds back, is black.
     """
 
     position: Vector = (0.0, 0.0, 5.0)
@@ -47,6 +56,8 @@ class Camera:
     lens_shift: tuple[float, float] = (0.0, 0.0)
     pixel_aspect: Positive = 1.0
     skew: float = 0.0
+    distortion: tuple[float, ...] = ()
+    fisheye_degrees: Positive = 180.0
 
     @classmethod
     def from_matrix(
@@ -58,26 +69,53 @@ class Camera:
         world_to_camera: ArrayLike | None = None,
         convention: Convention = "opencv",
         first_pixel: float = 0.5,
+        projection: Calibrated = "perspective",
+        distortion: ArrayLike = (),
         **fields: Any,
     ) -> Camera:
         """Return the camera with the intrinsic matrix K, (3, 3), of images of `size` (width, height) in pixels.
 
         One of `camera_to_world` and `world_to_camera`, a rigid motion (3, 4) or (4, 4), is its pose, in the convention
         of "opencv" (x right, y down, z ahead) or "opengl" (x right, y up, z back). first_pixel: both coordinates of the
-        center of the upper left pixel: 0.5, as in COLMAP, or 0, as in OpenCV. fields: others of Camera. Raises
-        UsageError for matrices that are not of these forms. (Hartley and Zisserman, "Multiple View Geometry", 2nd ed.,
-        6.1.)
+        center of the upper left pixel: 0.5, as in COLMAP, or 0, as in OpenCV. distortion: OpenCV's coefficients, in its
+        order, as `cv2.calibrateCamera` returns them, or `cv2.fisheye.calibrate` with the projection "fisheye". fields:
+        others of Camera. Raises UsageError for arrays that are not of these forms. (Hartley and Zisserman, "Multiple
+        View Geometry", 2nd ed., 6.1.)
         """
         known: dict[str, Any] = pose_of(camera_to_world, world_to_camera, convention)
-        return cls(**{**intrinsics_of(K, size, first_pixel), **known, **fields})
+        known |= intrinsics_of(K, size, first_pixel, projection == "fisheye")
+        known |= {"projection": projection, "distortion": coefficients_of(distortion, CALIBRATED[projection])}
+        return cls(**{**known, **fields})
 
     def matrix(self, size: tuple[int, int], first_pixel: float = 0.5) -> Doubles:
         """Return the intrinsic matrix K, (3, 3), for images of `size` (width, height) in pixels; see `from_matrix`."""
         width, height = size
-        fy = height / 2 / np.tan(np.radians(self.fov_degrees) / 2)
+        half = np.radians(self.fisheye_degrees if self.projection == "fisheye" else self.fov_degrees) / 2
+        fy = height / 2 / (half if self.projection == "fisheye" else np.tan(half))
         fx, less = fy / self.pixel_aspect, 0.5 - first_pixel
         center = width * (0.5 - self.lens_shift[0]) - less, height * (0.5 + self.lens_shift[1]) - less
         return np.array([[fx, fx * self.skew, center[0]], [0.0, fy, center[1]], [0.0, 0.0, 1.0]])
+
+    @property
+    def lens(self) -> LensModel:
+        """The distortion of a perspective or fisheye camera."""
+        return (
+            LensModel.fisheye(self.distortion)
+            if self.projection == "fisheye"
+            else LensModel.brown_conrady(self.distortion)
+        )
+
+    def project(self, points: ArrayLike, size: tuple[int, int], first_pixel: float = 0.5) -> Doubles:
+        """Return the pixels (…, 2) that points (…, 3) of the world lie at, as `cv2.projectPoints` does.
+
+        They are NaN for points that the camera has no image of. size, first_pixel: see `from_matrix`. Raises UsageError
+        for projections other than perspective and fisheye.
+        """
+        if self.projection not in CALIBRATED:
+            raise UsageError(f"a camera with the projection {self.projection!r} has no matrix to project points by")
+        pose, K = self.world_to_camera, self.matrix(size, first_pixel)
+        on_plane = self.lens.distorted(np.asarray(points, np.float64) @ pose[:3, :3].T + pose[:3, 3])
+        return np.asarray(on_plane @ K[:2, :2].T + K[:2, 2])
 
     @property
     def world_to_camera(self) -> Doubles:
@@ -90,6 +128,8 @@ class Camera:
     @property
     def type(self) -> type[CameraType]:
         """Its type, an entry of CAMERA_TYPES."""
+        if self.projection == "perspective" and any(self.distortion):
+            return DistortedPerspective
         return CAMERA_TYPES[self.projection]
 
     def scaled(self, factor: float) -> Camera:
@@ -118,12 +158,14 @@ class View(NamedTuple):
 class CameraType:
     """Base class of camera types. kernel: file in kernels/camera/ that generates the rays; lens_kernel: the one for a
     camera with an aperture, if it may have one; reads: fields of Camera that not all types read; all_around: whether
-    rays may point backwards, so that depth is the distance from the camera (ALL_AROUND in the kernel file)."""
+    rays may point backwards, so that depth is the distance from the camera (ALL_AROUND in the kernel file);
+    distorts: whether the kernel reads the lens's distortion."""
 
     kernel: ClassVar[str]
     lens_kernel: ClassVar[str | None] = None
     reads: ClassVar[frozenset[str]] = frozenset()
     all_around: ClassVar[bool] = False
+    distorts: ClassVar[bool] = False
 
     @staticmethod
     def axes(camera: Camera, view: View) -> tuple[Doubles, Doubles, Doubles]:
@@ -136,7 +178,7 @@ class Perspective(CameraType):
 
     kernel = "pinhole"
     lens_kernel = "thin_lens"
-    reads = frozenset({"aperture_radius", "focus_distance", "lens_shift", "pixel_aspect", "skew"})
+    reads = frozenset({"aperture_radius", "focus_distance", "lens_shift", "pixel_aspect", "skew", "distortion"})
 
     @staticmethod
     def axes(camera: Camera, view: View) -> tuple[Doubles, Doubles, Doubles]:
@@ -146,6 +188,19 @@ class Perspective(CameraType):
         up = extent * (view.up + camera.skew * view.right)
         across, along = camera.lens_shift
         return right, up, view.forward * focus + 2 * (across * right + along * up)
+
+
+class DistortedPerspective(Perspective):
+    """Pinhole or thin lens with distortion."""
+
+    kernel = "distorted_pinhole"
+    lens_kernel = "distorted_thin_lens"
+    distorts = True
+
+    @staticmethod
+    def axes(camera: Camera, view: View) -> tuple[Doubles, Doubles, Doubles]:
+        focus = (camera.focus_distance or view.distance) if camera.aperture_radius else 1.0
+        return view.right * focus, view.up * focus, view.forward * focus
 
 
 class Orthographic(CameraType):
@@ -168,8 +223,20 @@ class Equirectangular(CameraType):
     all_around = True
 
 
+class Fisheye(CameraType):
+    """Fisheye."""
+
+    kernel = "fisheye"
+    reads = frozenset({"fisheye_degrees", "lens_shift", "pixel_aspect", "skew", "distortion"})
+    all_around = True
+    distorts = True
+
+
 CAMERA_TYPES: dict[Projection, type[CameraType]] = {
     "perspective": Perspective,
     "orthographic": Orthographic,
     "equirectangular": Equirectangular,
+    "fisheye": Fisheye,
 }
+#: Projections of cameras with an intrinsic matrix, and the numbers of coefficients of their `distortion`.
+CALIBRATED: dict[str, tuple[int, ...]] = {"perspective": BROWN_CONRADY, "fisheye": FISHEYE}

@@ -53,7 +53,8 @@ class CameraControls:
             return camera
         if imgui.is_mouse_down(imgui.MouseButton_.middle.value):
             return shifted(camera, -dx / height, dy / height)
-        angle = radians(camera.fov_degrees) / height
+        degrees = camera.fisheye_degrees if camera.projection == "fisheye" else camera.fov_degrees
+        angle = radians(degrees) / height
         return turned(camera, dx * angle, dy * angle) if self.mode == "look" else orbited(camera, dx / 100, dy / 100)
 
     def _keys(self, camera: Camera) -> Camera:

@@ -37,6 +37,8 @@ DRAG = 0.005
 USUAL = {"max_depth": 64}
 #: Lines of a list before it scrolls.
 LINES = 20
+#: Most numbers in one widget.
+LONGEST = 4
 #: The largest int of the widgets.
 LARGEST = 2**31 - 1
 COLOR = imgui.ColorEditFlags_.float.value | imgui.ColorEditFlags_.hdr.value
@@ -120,8 +122,12 @@ def _edit_image(label: str, image: Pictured, step: float) -> Pictured:
 
 def _edit_tuple(label: str, kinds: tuple[Any, ...], value: tuple[Any, ...], step: float) -> tuple[Any, ...]:
     """Show a color widget if all numbers are at least 0, a vector widget, or separate widgets."""
+    kinds = kinds[:1] * len(value) if kinds[-1] is ... else kinds
+    if not kinds:
+        imgui.text_disabled(f"{label}: none")
+        return value
     limits = [limits_of(kind) for kind in kinds]
-    if limits[0] is None:
+    if limits[0] is None or len(kinds) > LONGEST:
         new = tuple(edit(f"{label}[{i}]", kind, part, step) for i, (kind, part) in enumerate(zip(kinds, value)))
         return new if any(a is not b for a, b in zip(new, value)) else value
     if _base(kinds[0]) is int:

@@ -27,6 +27,11 @@ def camera_rays(
         longitude, polar = 2 * np.pi * (x - 0.5), np.pi * y
         level = np.cos(longitude) * forward + np.sin(longitude) * right
         return np.tile(position, (len(pixel), 1)), np.sin(polar) * level + np.cos(polar) * up
+    if camera.projection == "fisheye":
+        # Equidistant: the angle from the view is proportional to the distance from the image's center.
+        across = (x - 0.5) * width / height * right + (0.5 - y) * up
+        theta = np.radians(camera.fisheye_degrees) * np.linalg.norm(across, axis=1, keepdims=True)
+        return np.tile(position, (len(pixel), 1)), np.cos(theta) * forward + np.sin(theta) * unit(across)
     half_height = float(np.tan(np.radians(camera.fov_degrees) / 2))
     aspect = width / height
     if camera.projection == "orthographic":

@@ -203,6 +203,7 @@ class _Stage:
             aperture_radius=draws.between(0.02, 0.3) if lens else 0.0,
             focus_distance=draws.between(3.0, 6.0) if lens and draws.chance(0.5) else None,
             view_height=draws.between(3.0, 5.0) if flat and draws.chance(0.5) else None,
+            fisheye_degrees=90.0 if projection == "fisheye" else 180.0,
         )
 
 

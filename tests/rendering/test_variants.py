@@ -144,6 +144,10 @@ def sights(scene: Scene) -> Iterator[tuple[str, Scene]]:
     yield "orthographic", replace(scene, camera=replace(camera, projection="orthographic"))
     round_about = Camera(position=camera.position, look_at=camera.look_at, projection="equirectangular")
     yield "equirectangular", replace(scene, camera=round_about)
+    distorted = replace(camera, distortion=(-0.2, 0.05, 0.01, 0.01))
+    yield "distorted", replace(scene, camera=distorted)
+    yield "distorted lens", replace(scene, camera=replace(distorted, aperture_radius=0.1))
+    yield "fisheye", replace(scene, camera=replace(camera, projection="fisheye"))
     for integrator in get_args(Integrator):
         if integrator not in ("path", "direct"):
             yield integrator, replace(scene, render=replace(scene.render, integrator=integrator))

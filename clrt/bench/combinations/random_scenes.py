@@ -225,8 +225,16 @@ class _Stage:
             aperture_radius=radius if lens else 0.0,
             focus_distance=focus if lens else None,
             view_height=None,
+            distortion=self._distortion() if projection == "perspective" else (),
         )
         return draws.record(Camera, **Camera(projection=projection).unread_fields() | given)
+
+    def _distortion(self) -> tuple[float, ...]:
+        """Return none, or OpenCV's first four coefficients."""
+        draws = self.draws
+        given = draws.chance(0.25)
+        k1, k2, p1, p2 = (draws.between(-limit, limit) for limit in (0.2, 0.1, 0.01, 0.01))
+        return (k1, k2, p1, p2) if given else ()
 
 
 def _product(*matrices: Any) -> Any:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...scene.geometry.scaling import SceneFrame, in_frame
 from ...scene.geometry.transform import rotation, transform_camera, transform_light, transform_mesh
-from ...scene.model import Environment, Scene, Sphere
+from ...scene.model import Camera, Environment, Scene, Sphere
 from .random_draws import Draws
 
 Matrix = NDArray[np.float64]
@@ -38,7 +38,7 @@ class Similarity:
             spheres=[_turned(sphere, linear) for sphere in scene.spheres],
             lights=[transform_light(light, linear) for light in scene.lights],
             environment=self._environment(scene.environment),
-            camera=transform_camera(scene.camera, linear),
+            camera=transform_camera(_mirrored(scene.camera) if self.mirrored else scene.camera, linear),
         )
         return in_frame(turned, self.frame)
 
@@ -49,6 +49,15 @@ class Similarity:
         if self.mirrored:
             image, degrees = np.ascontiguousarray(image[:, ::-1]), -degrees
         return replace(environment, image=image, rotation_degrees=degrees + self.turn[1])
+
+
+def _mirrored(camera: Camera) -> Camera:
+    """Return the camera whose image is mirrored."""
+    across, along = camera.lens_shift
+    distortion = list(camera.distortion)
+    if camera.projection == "perspective" and distortion:
+        distortion[3] *= -1  # p2
+    return replace(camera, lens_shift=(-across, along), skew=-camera.skew, distortion=tuple(distortion))
 
 
 def random_similarity(scene: Scene, draws: Draws) -> Similarity:

@@ -48,7 +48,7 @@ def check_scene(scene: Scene) -> None:
         if isinstance(owner.material, Dielectric) and owner.material.features() != {"TRANSMISSION"}:
             raise UsageError(f"{owner.name}: Cycles supports dielectric that is smooth, not thin, and absorbs nothing")
     exported_lights(scene)
-    if scene.camera.projection != "perspective" or scene.camera.aperture_radius:
+    if scene.camera.projection != "perspective" or scene.camera.aperture_radius or any(scene.camera.distortion):
         raise UsageError(f"{scene.name}: only pinhole cameras are exported to Cycles")
     if scene.render.integrator == "local":
         raise UsageError(f'{scene.name}: Cycles has no integrator "local"')

@@ -70,6 +70,8 @@ def _sensor(scene: Scene, sampler: str) -> Plugin:
     lens: Plugin = {"type": "perspective", "fov": camera.fov_degrees, "fov_axis": "y"}
     if camera.projection not in ("perspective", "orthographic"):
         raise UsageError(f"{scene.name}: Mitsuba has no {camera.projection} camera")
+    if any(camera.distortion):
+        raise UsageError(f"{scene.name}: Mitsuba has no lens distortion")
     if camera.projection == "orthographic":
         tall = camera.view_height or 2 * distance * tan(radians(camera.fov_degrees) / 2)
         lens = {"type": "orthographic"}  # x from -1 to 1

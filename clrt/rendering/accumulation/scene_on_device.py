@@ -21,7 +21,7 @@ from ...device.programs.background_compile import in_background
 from ...device.programs.program import BuiltProgram, build, make_kernel
 from ...errors import NoRoomError
 from ...scene.model import Camera
-from ..compile.camera_kernel import CAMERA_FIELDS, launch_record
+from ..compile.camera_kernel import camera_fields, launch_record
 from ..compile.compile_scene import QUEUES, RASTER, CompiledScene
 from .checked_loops import most_samples
 from .path_queues import PathQueues
@@ -143,7 +143,7 @@ class SceneOnDevice:
         self.compiled = self.compiled.seen_by(camera, *self.compiled.chosen_files["CAMERA"])
         width, height = int(self.launch["width"][0]), int(self.launch["height"][0])
         record = launch_record(self.compiled.camera, (width, height))
-        for name in CAMERA_FIELDS:
+        for name in camera_fields(camera):
             self.launch[name] = record[name]
 
     def warm_up(self, film: cl.Buffer, tiles: cl.Buffer) -> None:

@@ -1,4 +1,4 @@
-"""Kernel-side camera: its kernel file, and its fields of the LAUNCH record."""
+"""Kernel-side camera: its kernel file, and its fields of the launch record."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from ...device.programs.preamble import Buffers
 from ...scene.cameras import Camera, View
 from ...scene.ray_list import RayList
-from .records import LAUNCH, LISTED_RAY
+from .records import LAUNCH, LENS, LISTED_RAY
 
-#: Camera fields of the LAUNCH record.
+#: Camera fields of the launch record.
 CAMERA_FIELDS = ("position", "right", "up", "forward", "lens_radius")
+#: How far beyond the image's edges the widest filter reaches, in pixels, generously.
+BEYOND = 4
 
 
 def camera_file(camera: Camera, integrator: str) -> str:
@@ -44,6 +46,16 @@ def camera_defines(camera: Camera) -> dict[str, int]:
     return {"REPLICAS": camera.replicas, **({"ON_SURFACES": 1} if camera.on_surfaces else {})}
 
 
+def launch_of(camera: Camera, kind: np.dtype[Any] = LAUNCH) -> np.dtype[Any]:
+    """Return a launch record of a kind with the lens's distortion if the camera's kernel file reads that."""
+    return np.dtype([*kind.descr, *LENS.descr]) if camera.type.distorts else kind
+
+
+def camera_fields(camera: Camera) -> tuple[str, ...]:
+    """Return the names of the fields of its launch record that depend on the camera."""
+    return CAMERA_FIELDS + (LENS.names or ()) * camera.type.distorts
+
+
 def launch_record(camera: Camera, size: tuple[int, int], kind: np.dtype[Any] = LAUNCH) -> NDArray[Any]:
     """Return a launch record of a kind with camera and size. The camera's kernel file defines right, up and forward."""
     width, height = size
@@ -53,8 +65,23 @@ def launch_record(camera: Camera, size: tuple[int, int], kind: np.dtype[Any] = L
     right = np.cross(forward, np.asarray(camera.up, np.float64))
     right /= np.linalg.norm(right)
     view = View(right, np.cross(right, forward), forward, float(distance), width, height)
-    record = np.zeros(1, kind)
+    record = np.zeros(1, launch_of(camera, kind))
     record["position"], record["lens_radius"] = camera.position, camera.aperture_radius
     record["right"], record["up"], record["forward"] = camera.type.axes(camera, view)
     record["width"], record["height"] = width, height
+    if camera.type.distorts:
+        _set_lens(record, camera, size)
     return record
+
+
+def _set_lens(record: NDArray[Any], camera: Camera, size: tuple[int, int]) -> None:
+    """Set the fields of LENS."""
+    lens, (width, height) = camera.lens, size
+    pixels = np.array([[width / 2, 0, width / 2], [0, height / 2, height / 2], [0, 0, 1]])  # of (sx, sy, 1)
+    plane = np.linalg.solve(camera.matrix(size), pixels)
+    farthest = 1 + 2 * BEYOND / np.array(size)
+    corners = np.array([(x, y, 1) for x in (-farthest[0], farthest[0]) for y in (-farthest[1], farthest[1])])
+    edge = float(np.linalg.norm(corners @ plane[:2].T, axis=1).max())
+    record["numerator"], record["denominator"], record["reach"] = lens.numerator, lens.denominator, lens.reach(edge)
+    record["across"], record["down"], _ = plane
+    record["p1"], record["p2"] = lens.tangential

@@ -23,7 +23,7 @@ from ..film.tiles import TILE_PIXELS
 from .camera_kernel import camera_buffers
 from .choices import Choices, ResolvedChoices
 from .compile_ahead import begin_program
-from .features import WITH_LIGHT, features_of, files_for, preamble_of
+from .features import WITH_LIGHT, features_of, files_for, launch_typedef, preamble_of
 from .film_record import pixel_record
 from .geometry.pack_instances import ObjectIds
 from .pack_scene import pack_scene
@@ -78,10 +78,12 @@ class CompiledScene:
     def seen_by(self, camera: Camera, file: str) -> CompiledScene:
         """Return the same scene with another camera, whose kernel file is `file` (see `camera_file`)."""
         camera = camera_in(camera, self.frame)
+        own, other = (launch_typedef(each, self.features) for each in (self.camera, camera))
         return replace(
             self,
             camera=camera,
             buffers={**self.buffers, **camera_buffers(camera)},
+            preamble=self.preamble.replace(own, other),
             chosen_files={**self.chosen_files, "CAMERA": [file]},
         )
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from ...accel.layouts import NO_RAYS
 from ...accel.traversal_kernels import tree_defines, tree_features, tree_files
 from ...device.programs.preamble import defines, scene_struct, type_list, typedefs
 from ...scene.materials.material_types import MATERIALS, Material
 from ...scene.materials.textures import Texture
-from ...scene.model import RenderSettings, Scene
+from ...scene.model import Camera, RenderSettings, Scene
 from ...scene.ray_list import RayList
 from ..film.tiles import TILE
-from .camera_kernel import camera_defines, camera_file
+from .camera_kernel import camera_defines, camera_file, launch_of
 from .choices import OFFSETS, Choices, ResolvedChoices
 from .film_record import launch_type, pixel_record
 from .lights.light_types import SURFACES, TYPES
@@ -82,6 +82,11 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
     return features | {name for name, present in has.items() if present}
 
 
+def launch_typedef(camera: Camera, features: Collection[str]) -> str:
+    """Return the line of the preamble that declares the launch record."""
+    return typedefs({"Launch": launch_of(camera, launch_type(features))})
+
+
 def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str], part_bytes: int | None) -> str:
     """Return the definitions that precede all kernel files. part_bytes: see CompiledScene."""
     emitters, materials = packed.emitters, packed.materials
@@ -91,13 +96,13 @@ def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str
     surfaces = [t for t in emitters.types if t in SURFACES]
     rasterised = [typedefs({"Outline": OUTLINE}), defines({"FILTER_REACH": filter_reach(packed.scene.render.filter)})]
     catching = [type_list("CATCHER_TYPES", _numbered(materials.with_value("catcher")))]
-    launch = launch_type(features)
     return "\n".join(
         [
             defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(packed.tree), **unit}),
             defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
             defines({**{feature: 1 for feature in sorted(features)}, **camera_defines(packed.scene.camera)}),
-            typedefs({"Counts": COUNTS, "Pixel": pixel_record(features), "Guide": GUIDE, "Launch": launch}),
+            typedefs({"Counts": COUNTS, "Pixel": pixel_record(features), "Guide": GUIDE}),
+            launch_typedef(packed.scene.camera, features),
             scene_struct(packed.buffers, part_bytes, ["int bare"] if "CATCHER" in features else []),
             type_list("MATERIAL_TYPES", _numbered(materials.used)),
             type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),

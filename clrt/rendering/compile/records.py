@@ -89,6 +89,9 @@ LAUNCH = record(
     clamp_direct="f4",
     clamp_indirect="f4",
 )
+#: The distortion of a lens (kernels/camera/radial_lens.cl), at the end of the launch records of cameras that have it.
+#: across, down: rows that map (sx, sy, 1) to the image plane at distance 1; reach: the largest radius that has a ray.
+LENS = record(numerator="4f4", denominator="3f4", reach="f4", across="3f4", p1="f4", down="3f4", p2="f4")
 #: A ray of a RayList (kernels/camera/listed_rays.cl).
 LISTED_RAY = record(origin="3f4", reach="f4", direction="3f4", pad0="i4", surface_normal="3f4", pad1="i4")
 #: u_row, v_row: rows that map (u, v, 1) to the image's coordinates. first: of its texels.

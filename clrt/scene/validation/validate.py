@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError, UsageError
 from ..animation import Animation, ModelAnimation, SceneAnimation
 from ..camera_path import animation_problems
+from ..cameras import CALIBRATED
 from ..geometry.instancing import painted
 from ..light_images import LightImage
 from ..lights import LIGHTS
@@ -257,6 +258,12 @@ def _camera_problems(camera: Camera) -> list[str]:
     right = np.cross(forward / np.abs(forward).max(), up / np.abs(up).max())
     if np.linalg.norm(right) < 1e-6:
         return [f"camera.up: {show(camera.up)} is parallel to the view direction; write another, such as [0, 0, -1]"]
+    if (counts := CALIBRATED.get(camera.projection)) and len(camera.distortion) not in (0, *counts):
+        order = "k1, k2, p1, p2, k3, k4, k5, k6" if max(counts) == 8 else "k1, k2, k3, k4"
+        return [
+            f"camera.distortion: {show(camera.distortion)} has {len(camera.distortion)} entries; write "
+            f'{" or ".join(map(str, counts))} with projection = "{camera.projection}": {order}'
+        ]
     return [
         f'camera.{name}: {show(getattr(camera, name))} has no effect with projection = "{camera.projection}"; '
         "leave it out"
@@ -270,7 +277,7 @@ def _raster_problems(scene: Scene) -> list[str]:
     camera, plain = scene.camera, Camera()
     if scene.render.integrator != "raster":
         return []
-    names = ("projection", "aperture_radius", "lens_shift", "skew")
+    names = ("projection", "aperture_radius", "lens_shift", "skew", "distortion")
     given = next((name for name in names if getattr(camera, name) != getattr(plain, name)), None)
     if given is None:
         return []
