@@ -170,3 +170,49 @@ def test_colors_have_their_alpha(tmp_path: Path) -> None:
     assert list((tmp_path / "a" / "layers").iterdir()) == []
     clrt.save_views(tmp_path / "b", clrt.Scene(), [View(camera(0), {"alpha": alpha})])
     assert (tmp_path / "b" / "layers" / "view_00000.exr").is_file()
+
+
+DISTORTED: dict[str, dict[str, Any]] = {
+    "OPENCV": {"distortion": [-0.2, 0.05, 0.002, -0.003]},
+    "FULL_OPENCV": {"distortion": [0.9, 0.4, 0.002, -0.003, 0.02, 1.2, 0.5, 0.1]},
+    "OPENCV_FISHEYE": {"projection": "fisheye", "distortion": [0.05, -0.02, 0.004, -0.001]},
+}
+
+
+def seen_through(lens: dict[str, Any]) -> View:
+    """Return a view of a camera with distortion."""
+    K = np.array([[20, 0, 5.5], [0, 21, 4.0], [0, 0, 1]])
+    made = clrt.Camera.from_matrix(K, SIZE, world_to_camera=np.eye(4), **lens)
+    return View(made, {"rgb": np.zeros((*SIZE[::-1], 3), np.float32)})
+
+
+@pytest.mark.needs("pycolmap")
+@pytest.mark.parametrize("model", DISTORTED)
+def test_colmap_projects_through_the_lens(tmp_path: Path, model: str) -> None:
+    import pycolmap
+
+    view = seen_through(DISTORTED[model])
+    folder = clrt.save_views(tmp_path, SCENE, [view], "colmap")
+    (camera,) = pycolmap.Reconstruction(str(folder / "sparse" / "0")).cameras.values()
+    assert camera.model.name == model
+    points = np.random.default_rng(4).uniform((-0.4, -0.4, 1.0), (0.4, 0.4, 2.0), (50, 3))
+    np.testing.assert_allclose(camera.img_from_cam(points), view.camera.project(points, SIZE), atol=1e-9)
+
+
+def test_transforms_hold_the_distortion(tmp_path: Path) -> None:
+    for model, keys in (("OPENCV", ("k1", "k2", "p1", "p2")), ("OPENCV_FISHEYE", ("k1", "k2", "k3", "k4"))):
+        views = [seen_through(DISTORTED[model])] * 2
+        content = json.loads((clrt.save_views(tmp_path / model, SCENE, views) / "transforms.json").read_text())
+        assert content["camera_model"] == model and content.get("is_fisheye", False) == (model != "OPENCV")
+        assert [content[key] for key in keys] == DISTORTED[model]["distortion"]
+        assert "k1" not in content["frames"][0]
+    mixed = [seen_through({}), seen_through(DISTORTED["OPENCV"])]
+    content = json.loads((clrt.save_views(tmp_path / "mixed", SCENE, mixed) / "transforms.json").read_text())
+    assert "k1" not in content and [frame.get("k1", 0.0) for frame in content["frames"]] == [0.0, -0.2]
+
+
+def test_distortion_that_transforms_lack_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="k4, k5, k6"):
+        clrt.save_views(tmp_path, SCENE, [seen_through(DISTORTED["FULL_OPENCV"])])
+    with pytest.raises(UsageError, match="one camera_model"):
+        clrt.save_views(tmp_path, SCENE, [seen_through(DISTORTED[model]) for model in ("OPENCV", "OPENCV_FISHEYE")])

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scene.model import Camera
 from ..view_transform import to_levels
 from .layer_files import Layers, SavedView
 
@@ -28,8 +29,9 @@ class ColmapWriter:
 
     def add(self, view: SavedView) -> None:
         """Add a view, and some of the points that it sees."""
-        K, pose, (width, height) = view.camera.matrix(view.size), view.camera.world_to_camera, view.size
-        intrinsics = f"PINHOLE {width} {height} {K[0, 0]:.17g} {K[1, 1]:.17g} {K[0, 2]:.17g} {K[1, 2]:.17g}"
+        pose, (width, height) = view.camera.world_to_camera, view.size
+        model, parameters = camera_model(view.camera, view.size)
+        intrinsics = f"{model} {width} {height} {' '.join(f'{value:.17g}' for value in parameters)}"
         number = self._cameras.setdefault(intrinsics, len(self._cameras) + 1)
         self._views += 1
         values = " ".join(f"{value:.17g}" for value in (*quaternion(pose[:3, :3]), *pose[:3, 3]))
@@ -52,6 +54,19 @@ class ColmapWriter:
         self._points.close()
         lines = [f"{number} {text}\n" for text, number in self._cameras.items()]
         (self._folder / "cameras.txt").write_text("".join(lines), encoding="utf-8")
+
+
+def camera_model(camera: Camera, size: tuple[int, int]) -> tuple[str, list[float]]:
+    """Return COLMAP's camera model and its parameters: focal lengths, center and distortion."""
+    K, distortion = camera.matrix(size), list(camera.distortion)
+    parameters = [K[0, 0], K[1, 1], K[0, 2], K[1, 2]]
+    if camera.projection == "fisheye":
+        return "OPENCV_FISHEYE", parameters + (distortion or [0.0] * 4)
+    if not any(distortion):
+        return "PINHOLE", parameters
+    if not any(distortion[4:]):
+        return "OPENCV", parameters + distortion[:4]
+    return "FULL_OPENCV", parameters + distortion + [0.0] * (8 - len(distortion))
 
 
 def quaternion(rotation: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from typing import Literal, Protocol, get_args
 
 from ...errors import UsageError, check_choice
 from ...file_names import StrPath
+from ...scene.cameras import CALIBRATED
 from ...scene.model import Scene
 from ...scene.numbered_objects import object_names
 from ...scene.view import View
@@ -50,8 +51,9 @@ def save_views(
     - "coco": annotations.json, masks as run lengths and boxes of the objects, from the layer "instance_id"; its
       categories are the objects' names
 
-    Raises OutputError, and UsageError for another format, for a camera without perspective or with skew, and for layers
-    that a format lacks.
+    Cameras may have lens distortion: as OPENCV and OPENCV_FISHEYE, in COLMAP's model FULL_OPENCV, too. Raises
+    OutputError, and UsageError for another format, for a camera that is neither perspective nor fisheye or has skew,
+    for distortion that a format lacks, and for layers that it lacks.
     """
     chosen = (formats,) if isinstance(formats, str) else tuple(formats)
     for each in chosen:
@@ -61,7 +63,7 @@ def save_views(
         make_folder(part)
     writers = [WRITERS[each](path, scene) for each in chosen]
     for number, view in enumerate(views):
-        _check_pinhole(view, number)
+        _check_calibrated(view, number)
         saved = save_view(path, f"view_{number:05}", view.camera, view.layers)
         for writer in writers:
             writer.add(saved)
@@ -70,8 +72,8 @@ def save_views(
     return path
 
 
-def _check_pinhole(view: View, number: int) -> None:
+def _check_calibrated(view: View, number: int) -> None:
     camera = view.camera
-    if camera.projection != "perspective" or camera.skew:
+    if camera.projection not in CALIBRATED or camera.skew:
         what = f"skew {camera.skew:g}" if camera.skew else f"projection {camera.projection!r}"
-        raise UsageError(f"view {number} has {what}; datasets hold pinhole cameras without skew")
+        raise UsageError(f"view {number} has {what}; datasets hold perspective and fisheye cameras without skew")
