@@ -73,6 +73,7 @@ if TYPE_CHECKING:
         Sphere as Sphere,
     )
     from .scene.sky.sky import Sky as Sky
+    from .scene.stereo import stereo_pair as stereo_pair
     from .scene.view import View as View
 
     __version__: str
@@ -108,6 +109,7 @@ _HOME = {
         "Plastic",
     ),
     "scene.model": ("Backdrop", "Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
+    "scene.stereo": ("stereo_pair",),
     "scene.view": ("View",),
     "scene.materials.textures": ("Picture", "Texture"),
     "scene.sky.sky": ("Sky",),
