@@ -73,7 +73,7 @@ def test_rays_are_those_of_opencv(device: Device) -> None:
     import cv2
 
     rng = np.random.default_rng(11)
-    undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)
+    undistort: Any = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)
     until = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 1000, 1e-12)
     cameras, pixels = [], rng.uniform((0, 0), np.subtract(SIZE, 1), (7500, PIXELS, 2))
     expected, given = np.empty((*pixels.shape[:2], 3)), np.empty(pixels.shape[:2], bool)
