@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +27,13 @@ from clrt.rendering.compile.choices import OFFSETS
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.film.film import Film
 from clrt.scene.model import Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.ray_list import Measured, RayList
 
 from .accel.cases import soup, spheres
 from .rendering.lamps import lamps
 from .rendering.rays import icosphere
 from .rendering.test_variants import everything, painted, planted, shelf, sights
+from .rendering.test_wavefront import catching
 
 SETTINGS = RenderSettings(size=(6, 4), spp=2, max_depth=5, seed=11)
 TRIANGLES = soup(60, 0.5)
@@ -124,6 +126,15 @@ def ball() -> Scene:
     return replace(alone, lights=lamps(3).lights)
 
 
+def measured(device: Device) -> Iterator[tuple[str, Answers]]:
+    """Yield measurements of light at two points of surfaces."""
+    normals = np.array([[0, 1, 0], [0.6, 0.8, 0]], np.float32)
+    for measures in get_args(Measured):
+        rays = RayList(origins=ORIGINS[:2], directions=normals, surface_normals=normals, measures=measures)
+        settings = replace(SETTINGS, size=rays.size, filter="box")
+        yield measures, picture(device, replace(scene(), camera=rays, render=settings), paths="lanes")
+
+
 def queued_pictures(device: Device) -> Iterator[tuple[str, Answers]]:
     """Yield images that are rendered by queues, which need scalar kernels."""
     if device.lanes > 1:
@@ -148,6 +159,8 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     for settings, chosen in variants():
         yield chosen["tests"].triangle, picture(device, replace(scene(), render=settings), **chosen)
     yield "ball", picture(device, ball())
+    yield "catching", picture(device, replace(catching(scene()), render=replace(SETTINGS, transparent=True)))
+    yield from measured(device)
     lit = replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)], render=SETTINGS)
     yield "lamps", picture(device, lit)
     painting = replace(painted(scene()), render=SETTINGS)

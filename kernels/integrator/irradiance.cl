@@ -49,7 +49,7 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
     path.specular = NO_LANES;
     path.origin = offset_origin(ray->origin, error, ng, path.wi);
     active = active & (path.pdf > 0.0f) & (dot3(path.wi, ng) > 0.0f);
-    L = add(L, light_of_path(scene, launch, &path, 2, active, sampler, rays, direct, removed));
+    L = add(L, light_of_path(scene, launch, path, 2, active, sampler, rays, direct, removed));
 #if DIRECT_LIGHT && LIGHTS
     *direct = add(*direct, sampled);
 #endif

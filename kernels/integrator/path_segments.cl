@@ -3,7 +3,7 @@
 #include "traverse/visits.cl"
 
 // The light that a path brings from its segment `depth` on, 1 being the camera ray.
-static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path *path, int depth, ireal active,
+static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path path, int depth, ireal active,
                                   Sampler *sampler, ureal *rays, real3 *direct, real *removed ALPHA_PARAMETER
                                   CATCHER_PARAMETER) {
     real3 L = splat(ZERO);
@@ -11,7 +11,7 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
         *rays += active ? (ureal)(1) : (ureal)(0);
         VISIT(segments, depth);
         Surface surface;
-        Hits hits = first_surface(scene, path->origin, path->wi, depth == 1, active, sampler, &surface);
+        Hits hits = first_surface(scene, path.origin, path.wi, depth == 1, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
 #if CATCHER
         if (depth == 1) {
@@ -20,31 +20,31 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
             hit = hit & active;
         }
 #endif
-        absorb(path, hit ? hits.t : (real)(INFINITY));
-        L = add(L, clamped(launch, emitted_light(scene, path, &surface, hits.t, hit), depth, removed));
-        L = add(L, clamped(launch, escaped_light(scene, path, LIT(path, depth, active & !hit) CAMERA_ARGUMENT(depth == 1)),
+        absorb(&path, hit ? hits.t : (real)(INFINITY));
+        L = add(L, clamped(launch, emitted_light(scene, &path, &surface, hits.t, hit), depth, removed));
+        L = add(L, clamped(launch, escaped_light(scene, &path, LIT(&path, depth, active & !hit) CAMERA_ARGUMENT(depth == 1)),
                            depth, removed));
 #if DIRECT_LIGHT
         if (depth <= 2) *direct = L;
 #endif
 #if ALPHA
-        *alpha += coverage(path, depth, COVERING(hit, *caught), active & !hit);
+        *alpha += coverage(&path, depth, COVERING(hit, *caught), active & !hit);
 #endif
         active = hit;
         if (depth >= launch->max_depth || !ANY(active)) return L;
 #if PRIMITIVES
 #if DISPERSION
-        surface.throughput = path->beta;
+        surface.throughput = path.beta;
 #endif
         VISIT(shading, surface.material);
-        Shading shading = shading_at(scene, path->wi, &surface);
+        Shading shading = shading_at(scene, path.wi, &surface);
 #if LIGHTS
         ShadowRay shadow;
-        ireal sent = aim_at_light(scene, path, &surface, &shading, active, sampler, &shadow);
+        ireal sent = aim_at_light(scene, &path, &surface, &shading, active, sampler, &shadow);
         *rays += sent ? (ureal)(1) : (ureal)(0);
         if (ANY(sent)) L = add(L, clamped(launch, light_along(scene, &shadow, sent), depth + 1, removed));
 #endif
-        active = go_on(path, &surface, &shading, active, depth, launch->max_depth, sampler);
+        active = go_on(&path, &surface, &shading, active, depth, launch->max_depth, sampler);
 #endif
     }
 }
