@@ -15,12 +15,14 @@ from clrt.cli import COMMANDS
 from ..covering import others
 
 OTHER = Path(__file__).parents[1] / "other_system.py"
+TEXTURES = Path(__file__).parents[2] / "scenes" / "textures.toml"
 SMALL = ("--size", "16x16", "--spp", "1", "-q")
 #: A call of each command; only the help of those that need a display or other software.
 CALLS = {
     "render": ("render", "scene.toml", *SMALL, "-o", "image.png"),
     "debug": ("debug", "scene.toml", "--pixel", "5,5"),
     "info": ("info", "scene.toml"),
+    "bake": ("bake", str(TEXTURES), "--mesh", "table", "--size", "8x8", "--spp", "16", "-q", "-o", "baked.png"),
     "convert": ("convert", "model.obj", "other.toml"),
     "compare": ("compare", "red.png", "red.png"),
     "devices": ("devices", "--check"),
@@ -53,10 +55,12 @@ def test_every_command_is_called() -> None:
 @pytest.mark.parametrize(
     ("system", "name"),
     [
-        *(("win32", name) for name in ("render", "convert", "compare", "cache", "view")),
+        *(("win32", name) for name in ("render", "bake", "convert", "compare", "cache", "view")),
         *(("darwin", name) for name in ("render", "debug", "doctor")),
         *others(*(("win32", name) for name in ("debug", "info", "devices", "doctor", "bench"))),
-        *others(*(("darwin", name) for name in ("convert", "compare", "cache", "view", "info", "devices", "bench"))),
+        *others(
+            *(("darwin", name) for name in ("bake", "convert", "compare", "cache", "view", "info", "devices", "bench"))
+        ),
     ],
 )
 def test_commands_need_nothing_that_another_system_lacks(folder: Path, system: str, name: str) -> None:
