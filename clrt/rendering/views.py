@@ -45,9 +45,9 @@ def each_view(
     """Render the scene from each camera in turn; BVHs and programs are kept, and memory does not grow.
 
     layers: "rgb", linear Rec. 709, 3 channels; "alpha", which makes the images transparent, and "rgb" premultiplied;
-    names of AOVs (docs/aovs.md), "instance_id" and "material_id" being
-    "object" and "material"; "flow", 2 channels: how many pixels to the right and down what the pixel's center shows
-    lies in the next view, NaN where nothing is hit, or where that view's lens does not image it, and in the last view.
+    names of AOVs (docs/aovs.md), "instance_id" and "material_id" being "object" and "material"; "flow", 2 channels:
+    how far to the right and down, in pixels, the next view shows the point at the pixel's center, NaN where nothing is
+    hit, or where that view's lens does not image it, and in the last view.
     Without "rgb" and AOVs of light, no light is computed. Raises UsageError for other layers, or for flow between
     cameras neither perspective nor fisheye, SceneError for a camera that cannot be used, and what `render` raises.
     """

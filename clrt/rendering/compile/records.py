@@ -47,8 +47,8 @@ SPHERE_LIGHT = record(
     center="3f4", radius="f4", radiance="3f4", texture="i4", sphere="i4", double_sided="i4", pad="2i4"
 )
 
-#: An image of lights. u_row, v_row: rows that map (u, v, 1) to the image's coordinates. first: of its texels.
-LIGHT_IMAGE = record(
+#: Fields of an image. u_row, v_row: rows that map (u, v, 1) to the image's coordinates. first: of its texels.
+_IMAGE = dict(
     u_row="3f4",
     width="i4",
     v_row="3f4",
@@ -58,6 +58,8 @@ LIGHT_IMAGE = record(
     wrap_v="i4",
     nearest="i4",
 )
+#: An image of lights.
+LIGHT_IMAGE = record(**_IMAGE)
 LIGHT_TEXEL = record(value="3f4", pad="f4")
 
 ENVIRONMENT = record(color="3f4", pad="f4", width="i4", height="i4", rotation_cos="f4", rotation_sin="f4")
@@ -94,16 +96,8 @@ LAUNCH = record(
 LENS = record(numerator="4f4", denominator="3f4", reach="f4", across="3f4", p1="f4", down="3f4", p2="f4")
 #: A ray of a RayList (kernels/camera/listed_rays.cl).
 LISTED_RAY = record(origin="3f4", reach="f4", direction="3f4", pad0="i4", surface_normal="3f4", pad1="i4")
-#: u_row, v_row: rows that map (u, v, 1) to the image's coordinates. first: of its texels.
 TEXTURE = record(
-    u_row="3f4",
-    width="i4",
-    v_row="3f4",
-    height="i4",
-    first="i4",
-    wrap_u="i4",
-    wrap_v="i4",
-    nearest="i4",
+    **_IMAGE,
     uv_set="i4",
     shift="u4",
     pad="2i4",
