@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 FOLDERS = {"farm": "farm", "oracle": "statistics", "bench": "study", "window": "window"}
 #: Limit on PoCL's cache of compiled programs between runs; one run of all tests adds about 200 MB.
 MOST_KEPT_BYTES = 500_000_000
+# With threads of its own in each of several test processes, OpenBLAS takes the time of all cores to wait.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 #: Variables that control terminal output. Tests set them themselves, regardless of the machine's environment.
 DISPLAY_VARIABLES = ("CI", "COLUMNS", "FORCE_COLOR", "LINES", "NO_COLOR")
 

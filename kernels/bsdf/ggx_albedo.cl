@@ -16,8 +16,6 @@
 #define FRESNEL_Y 6
 #define MEAN_LOSS_Y 12
 #define MEAN_FRESNEL_Y 9
-// Horner's scheme is a chain of dependent operations; unrolled, the chains overlap.
-#define UNROLLED _Pragma("unroll")
 
 typedef struct { real by_f0, by_f90, lost; } Bounce;
 

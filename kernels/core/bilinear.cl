@@ -10,6 +10,8 @@ typedef struct {
     real weight[4];
 } Bilinear;
 
+#define EACH_TEXEL(i) UNROLLED for (int i = 0; i < 4; ++i)
+
 static inline real on_picture(real u, ireal wrap) {
     real turns = floor(u), pair = u - 2.0f * floor(0.5f * u);
     real mirrored = pair > 1.0f ? 2.0f - pair : pair;
@@ -32,14 +34,13 @@ static inline Bilinear bilinear(real u, real v, ireal width, ireal height, ireal
     real right_share = x - left, lower_share = y - top;
     right_share = nearest ? (right_share < 0.5f ? ZERO : ONE) : right_share;
     lower_share = nearest ? (lower_share < 0.5f ? ZERO : ONE) : lower_share;
-    ireal column[2], row[2];
-    for (int i = 0; i < 2; ++i) {
-        column[i] = inside(TO_INT(left) + i, width, wrap_u == REPEAT);
-        row[i] = inside(TO_INT(top) + i, height, wrap_v == REPEAT);
-    }
+    ireal first_column = inside(TO_INT(left), width, wrap_u == REPEAT);
+    ireal first_row = inside(TO_INT(top), height, wrap_v == REPEAT);
+    ireal last_column = inside(TO_INT(left) + 1, width, wrap_u == REPEAT);
+    ireal last_row = inside(TO_INT(top) + 1, height, wrap_v == REPEAT);
     Bilinear found;
-    for (int i = 0; i < 4; ++i) {
-        found.texel[i] = row[i >> 1] * width + column[i & 1];
+    EACH_TEXEL(i) {
+        found.texel[i] = (i >> 1 ? last_row : first_row) * width + (i & 1 ? last_column : first_column);
         found.weight[i] = (i & 1 ? right_share : 1.0f - right_share) * (i >> 1 ? lower_share : 1.0f - lower_share);
     }
     return found;

@@ -62,6 +62,9 @@ typedef union { ireal all; int lane[LANES]; } IntLanes;
 #define LANE_INT(value, lane) (((const int *)&(value))[lane])
 #define LANE_UINT(value, lane) (((const uint *)&(value))[lane])
 
+// For loops over the elements of a small private array: unrolled, the elements are kept in registers.
+#define UNROLLED _Pragma("unroll")
+
 #define ZERO ((real)(0.0f))
 #define ONE ((real)(1.0f))
 #define ALL_LANES ((real)(0.0f) == (real)(0.0f))

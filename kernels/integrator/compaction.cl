@@ -4,7 +4,7 @@
 
 #define WORDS(type) ((int)(sizeof(type) / sizeof(ireal)))
 #define WORD(value, i) (((ireal *)&(value))[i])
-#define EACH_WORD(value) _Pragma("unroll") for (int word = 0; word < WORDS(value); ++word)
+#define EACH_WORD(value) UNROLLED for (int word = 0; word < WORDS(value); ++word)
 
 // Load or store a value as the lanes `first`, first + 1 … of rows.
 #define LOAD(value, rows, first) EACH_WORD(value) WORD(value, word) = vload8(0, (rows)[word] + (first));

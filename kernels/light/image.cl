@@ -12,7 +12,7 @@ static inline real3 light_image(const Scene *scene, ireal image, real u, real v)
                                GATHER(ireal, scene->light_images, image, .nearest) != 0);
     ireal first = GATHER(ireal, scene->light_images, image, .first);
     real3 value = splat(ZERO);
-    for (int i = 0; i < 4; ++i) {
+    EACH_TEXEL(i) {
         value = mad3(GATHER3(scene->light_texels, first + around.texel[i], .value), around.weight[i], value);
     }
     return value;

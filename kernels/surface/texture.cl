@@ -53,7 +53,7 @@ static inline Footprint footprint(const Scene *scene, ireal texture, const Coord
                                wrap_u, wrap_v, GATHER(ireal, scene->textures, texture, .nearest) != 0);
     ireal first = GATHER(ireal, scene->textures, texture, .first);
     Footprint found;
-    for (int i = 0; i < 4; ++i) {
+    EACH_TEXEL(i) {
         found.texel[i] = GATHER(ureal, scene->texels, first + around.texel[i], .rgba);
         found.weight[i] = around.weight[i];
     }
@@ -70,7 +70,7 @@ static inline real3 textured3(const Scene *scene, ireal texture, real3 factor, c
     if (!ANY(present)) return factor;
     Footprint found = footprint(scene, present ? texture : (ireal)(0), at);
     real3 color = splat(ZERO);
-    for (int i = 0; i < 4; ++i) {
+    EACH_TEXEL(i) {
         ureal texel = found.texel[i];
         real3 decoded3 = vector(decoded(scene, texel, 0), decoded(scene, texel, 8), decoded(scene, texel, 16));
         color = mad3(decoded3, found.weight[i], color);
@@ -81,7 +81,7 @@ static inline real3 textured3(const Scene *scene, ireal texture, real3 factor, c
 // A channel of the texture, from 0 to 1; shift: eight times its index.
 static inline real filtered(const Footprint *found, ureal shift) {
     real sum = ZERO;
-    for (int i = 0; i < 4; ++i) sum += TO_REAL(found->texel[i] >> shift & 255u) * found->weight[i];
+    EACH_TEXEL(i) sum += TO_REAL(found->texel[i] >> shift & 255u) * found->weight[i];
     return sum * (1.0f / 255.0f);
 }
 
