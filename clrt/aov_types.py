@@ -5,6 +5,7 @@ To add one: write its entry here, and the function that its source needs.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 #: Source of its values. mean, center: the function seen_NAME of kernels/aov/first_hit.cl, averaged over a pixel's
@@ -15,6 +16,10 @@ Source = Literal["mean", "center", "hits", "coverage", "film"]
 Display = Literal["light", "error", "color", "direction", "position", "depth", "count", "id", "matte"]
 #: Channels of three layers, of two ids and coverages each.
 CRYPTOMATTE = tuple(f"{layer:02}.{channel}" for layer in range(3) for channel in "RGBA")
+
+
+#: The AOV that has a layer for each light group of a scene, and what their names begin with.
+LIGHT_GROUPS, OF_GROUP = "light_groups", "light_group."
 
 
 class AovType(NamedTuple):
@@ -40,14 +45,26 @@ AOV_TYPES = {
     "crypto_material": AovType(CRYPTOMATTE, "coverage", "matte"),
     "direct": AovType("RGB", "film", "light"),
     "indirect": AovType("RGB", "film", "light"),
+    LIGHT_GROUPS: AovType("RGB", "film", "light"),
     "variance": AovType("RGB", "film", "error"),
     "samples": AovType("X", "film", "count"),
 }
 
 
+def aov_type(name: str) -> AovType:
+    """Return the type of an AOV, or of a layer of a light group."""
+    return AOV_TYPES[LIGHT_GROUPS if name.startswith(OF_GROUP) else name]
+
+
+def layer_names(aovs: Iterable[str], groups: Iterable[str]) -> list[str]:
+    """Return the names of the layers of AOVs: their own, or those of the light groups."""
+    layers = [f"{OF_GROUP}{group}" for group in groups]
+    return [layer for name in aovs for layer in (layers if name == LIGHT_GROUPS else [name])]
+
+
 def channel_names(aov: str) -> list[str]:
     """Return the names of its channels in a file."""
-    channels = AOV_TYPES[aov].channels
+    channels = aov_type(aov).channels
     return [f"{aov}.{channel}" if isinstance(channels, str) else f"{aov}{channel}" for channel in channels]
 
 

@@ -148,7 +148,7 @@ class FrameSequence:
                 last, facts = still, {**facts_of(still, choices), "camera": ""}
             made_of = repr((sorted(facts.items()), still.camera, goal, shown))
             digest = hashlib.sha256(made_of.encode()).hexdigest()
-            outputs = replace(self._of(number), header={"frame": number, "frame_hash": digest})
+            outputs = replace(self._of(number).of_scene(still), header={"frame": number, "frame_hash": digest})
             done = self.resume and all(
                 metadata_of(path, "clrt:frame_hash") == digest for path in (*outputs.pictures, *outputs.raws)
             )

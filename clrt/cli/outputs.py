@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..farm.banded_picture import BandedPicture
     from ..output.image import Image
     from ..rendering.renderer import Renderer
+    from ..scene.model import Scene
 
 
 @dataclass
@@ -44,6 +45,15 @@ class Outputs:
     spool: Path | None = None
     pipes: tuple[Pipe, ...] = ()
     _errors: list[OutputError] = field(default_factory=list)
+
+    def of_scene(self, scene: Scene) -> Outputs:
+        """Return the outputs with the layers that its light groups have as AOVs."""
+        from ..aov_types import LIGHT_GROUPS, layer_names
+        from ..scene.light_groups import light_groups
+
+        if LIGHT_GROUPS not in self.aovs:
+            return self
+        return replace(self, aovs=tuple(layer_names(self.aovs, light_groups(scene))))
 
     @property
     def raws(self) -> tuple[Path, ...]:

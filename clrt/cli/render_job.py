@@ -139,7 +139,9 @@ class RenderJob:
         with files_read() as inputs:
             content = self.loading.load(self.scene, moving=self.frames.frames is not None)
         if self.sequence is None:
+            self.results = self.results.of_scene(content)
             self.results.check_apart(inputs, self.saving.checkpoint)
+            self.results.check_unprotected(self.saving.checkpoint)
         else:
             content = self.sequence.scene(content, self.options["size"], self.frames)
             self.sequence.check_apart(inputs)

@@ -9,6 +9,8 @@ from typing import Any
 
 from ..scene.editing import materials_of
 from ..scene.light_images import LightImage
+from ..scene.lights import Light
+from ..scene.materials.material import Material
 from ..scene.materials.textures import Texture
 from ..scene.model import Environment, Instance, Mesh, Scene, Sphere
 from ..scene.provenance import material_of
@@ -16,6 +18,8 @@ from ..scene.sky.sky import SkyEnvironment
 
 #: Most lines per list; --json has all.
 MOST = 40
+#: The field with the light group of an emitter.
+GROUP = "light_group"
 
 
 def materials_in(scene: Scene) -> list[dict[str, Any]]:
@@ -42,7 +46,11 @@ def materials_in(scene: Scene) -> list[dict[str, Any]]:
 def lights_in(scene: Scene) -> list[dict[str, Any]]:
     """Return the scene's lights, its environment unless black, and each emissive object with its radiance."""
     rows = [
-        {"type": light.kernel, **{each.name: _shown(getattr(light, each.name)) for each in fields(light)}}
+        {
+            "type": light.kernel,
+            **{each.name: _shown(getattr(light, each.name)) for each in fields(light) if each.name != GROUP},
+            **_group(light),
+        }
         for light in scene.lights
     ]
     rows += _environment(scene.environment)
@@ -50,8 +58,14 @@ def lights_in(scene: Scene) -> list[dict[str, Any]]:
     for each in objects:
         material = each.material if isinstance(each, Sphere) else material_of(each)
         if any(material.radiance):
-            rows.append({"type": type(each).__name__.lower(), "name": each.name, "radiance": material.radiance})
+            kind = type(each).__name__.lower()
+            rows.append({"type": kind, "name": each.name, "radiance": material.radiance, **_group(material)})
     return rows
+
+
+def _group(emitter: Light | Environment | Material) -> dict[str, str]:
+    """Return the light group of an emitter, if it has one."""
+    return {GROUP: emitter.light_group} if emitter.light_group else {}
 
 
 def _shown(value: Any) -> Any:
@@ -71,12 +85,13 @@ def _environment(sky: Environment) -> Iterator[dict[str, Any]]:
             "sun_azimuth_degrees": azimuth,
             "turbidity": sky.sky.turbidity,
             "strength": sky.strength * sky.sky.sky_strength,
+            **_group(sky),
         }
     elif sky.image is not None and sky.strength:
         height, width = sky.image.shape[:2]
-        yield {"type": "environment map", "size": f"{width}x{height}", "strength": sky.strength}
+        yield {"type": "environment map", "size": f"{width}x{height}", "strength": sky.strength, **_group(sky)}
     elif sky.image is None and any(sky.color) and sky.strength:
-        yield {"type": "environment", "color": sky.color, "strength": sky.strength}
+        yield {"type": "environment", "color": sky.color, "strength": sky.strength, **_group(sky)}
 
 
 def material_texts(rows: Sequence[Mapping[str, Any]]) -> list[str]:

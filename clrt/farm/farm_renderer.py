@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..device.open import Device, Selectors
 from ..errors import DeviceError, UsageError
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
-from ..rendering.compile.film_record import film_features, pixel_record
+from ..rendering.compile.film_record import film_pixel
 from ..rendering.render_warnings import PictureWarnings
 from ..rendering.renderer import Renderer, State
 from ..rendering.renderer_options import RendererOptions
@@ -65,7 +65,7 @@ class FarmRenderer(Renderer):
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> FarmAccumulation:
         order = Order(self.scene, self.choices, self._planned_spp, self._selectors, self._simulated)
-        picture = FarmAccumulation(self._cluster, order, pixel_record(film_features(self.scene, self.choices)))
+        picture = FarmAccumulation(self._cluster, order, film_pixel(self.scene, self.choices))
         facts = picture.dispatch.wait_for()[0].facts or {}
         self.warnings = PictureWarnings(self.scene, facts["report"]["kernel"]["features"])
         return picture

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rendering.compile.film_record import film_features, pixel_record
+from ..rendering.compile.film_record import film_pixel
 from ..rendering.film.tiles import TILE_PIXELS
 from .orders import Order
 
@@ -30,7 +30,7 @@ class Simulation:
 
     def __init__(self, order: Order) -> None:
         assert order.simulated is not None
-        self._speed, self._pixel = order.simulated, pixel_record(film_features(order.scene, order.choices))
+        self._speed, self._pixel = order.simulated, film_pixel(order.scene, order.choices)
 
     def share(self, tiles: NDArray[np.uint32], first: int, more: int, pixels: NDArray[Any] | None) -> NDArray[Any]:
         """Return the pixels with `more` more samples, all black, after the time that those would take."""

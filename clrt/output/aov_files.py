@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..aov_types import AOV_TYPES, channel_names
+from ..aov_types import aov_type, channel_names
 from .file_formats import is_shown
 from .view_transform import to_display
 
@@ -44,7 +44,7 @@ def files_beside(path: Path, names: Iterable[str]) -> dict[str, Path]:
 def drawn(name: str, aov: NDArray[np.generic], view: str, exposure: float) -> NDArray[np.uint8]:
     """Return a visualization of an AOV as 8-bit colors (height, width, 3); see docs/aovs.md."""
     values = aov.astype(np.float32).reshape(*aov.shape[:2], -1)
-    match AOV_TYPES[name].display:
+    match aov_type(name).display:
         case "light":
             return to_display(values, view, exposure)
         case "error":

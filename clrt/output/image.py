@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..aov_types import OF_GROUP
 from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from .data_images import shown_data
@@ -44,6 +45,18 @@ class Image:
         if self.alpha is None or self.backdrop is not None:
             return self.pixels
         return np.concatenate([self.pixels, self.alpha[..., None]], axis=2)
+
+    @property
+    def light_groups(self) -> dict[str, NDArray[np.float32]]:
+        """The light of each light group by its name, (height, width, 3), if the AOV light_groups was requested.
+
+        Their sum is the image, or if that is denoised, the raw one (docs/light-groups.md).
+        """
+        return {
+            name.removeprefix(OF_GROUP): layer.astype(np.float32, copy=False)
+            for name, layer in self.aovs.items()
+            if name.startswith(OF_GROUP)
+        }
 
     @with_default_errors
     def save(self, path: StrPath, *, view: str = "srgb", exposure: float = 0.0) -> Path:

@@ -7,13 +7,15 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..aov_types import AOV_TYPES, aovs_from
+from ..aov_types import AOV_TYPES, LIGHT_GROUPS, aovs_from, layer_names
 from ..errors import UsageError, did_you_mean
 from ..float_errors import with_default_errors
+from ..scene.light_groups import light_groups
 from ..scene.model import Scene
 from .accumulation.accumulation import Accumulation
 from .compile.features import WITH_LIGHT
 from .film.film import Film
+from .film.group_layers import group_layers
 
 AOVS = tuple(AOV_TYPES)
 #: AOVs that make the film accumulate direct light separately.
@@ -21,22 +23,27 @@ LIGHT = ("direct", "indirect")
 
 
 class Aovs:
-    """AOVs of one render, by name in the requested order. Raises UsageError like `chosen_aovs` and `check_light`."""
+    """AOVs of one render, by name in the requested order, a layer for each light group. Raises UsageError like
+    `chosen_aovs` and `check_light`."""
 
     def __init__(self, names: str | Iterable[str] | None, integrator: str) -> None:
         self._names = chosen_aovs(names)
         check_light(self._names, integrator)
         self.first_hits = dict[str, NDArray[np.generic]]()
+        self._groups: tuple[str, ...] = ()
 
     def begin(self, picture: Accumulation, scene: Scene) -> None:
         """Render the first-hit AOVs, so that an interrupted render has them, too."""
         seen = seen_first(self._names)
         self.first_hits = picture.first_hits(scene, seen) if seen else {}
+        self._groups = light_groups(scene) if LIGHT_GROUPS in self._names else ()
 
     def of(self, film: Film) -> dict[str, NDArray[np.generic]]:
         """Return all requested AOVs, given this film."""
         made = self.first_hits | film_aovs(film, self._names)
-        return {name: made[name] for name in self._names}
+        if self._groups:
+            made |= zip(layer_names([LIGHT_GROUPS], self._groups), group_layers(film, self._groups))
+        return {name: made[name] for name in layer_names(self._names, self._groups)}
 
 
 def chosen_aovs(names: str | Iterable[str] | None) -> tuple[str, ...]:
@@ -61,12 +68,19 @@ def needs_direct_light(names: Iterable[str]) -> bool:
     return not set(LIGHT).isdisjoint(names)
 
 
+def needs_light_groups(names: Iterable[str]) -> bool:
+    """Return whether the film must accumulate the light of each light group separately for these AOVs."""
+    return LIGHT_GROUPS in names
+
+
 def check_light(names: Iterable[str], integrator: str) -> None:
     """Raise UsageError if AOVs of light are requested from an integrator that does not compute light transport."""
-    if needs_direct_light(names) and integrator not in WITH_LIGHT:
+    asked = [name for name in (*LIGHT, LIGHT_GROUPS) if name in names]
+    if asked and integrator not in WITH_LIGHT:
+        one = len(asked) == 1
         raise UsageError(
-            f"the AOVs {' and '.join(LIGHT)} store light, and the integrator is {integrator}; choose "
-            f"{' or '.join(WITH_LIGHT)}"
+            f"the AOV{'s' * (not one)} {' and '.join(asked)} store{'s' * one} light, and the integrator is "
+            f"{integrator}; choose {' or '.join(WITH_LIGHT)}"
         )
 
 

@@ -11,7 +11,7 @@ from ..device.device_info import Paths
 from ..device.open import Selectors
 from ..file_names import StrPath
 from ..scene.render_settings import Culling, Filter, Integrator, RenderSettings, Sampler
-from .aovs import chosen_aovs, needs_direct_light, seen_first
+from .aovs import chosen_aovs, needs_direct_light, needs_light_groups, seen_first
 from .checkpoint.policy import CheckpointPolicy
 from .compile.choices import Choices, Lanes, Offset
 
@@ -96,7 +96,8 @@ def choices_of(options: Mapping[str, object]) -> Choices:
     """Return the choices, including those that the requested AOVs imply. Raises UsageError for unknown values."""
     aovs: Any = options.get("aovs")
     names, chosen = chosen_aovs(aovs), _given(options, Choices)
-    by_aovs = {"direct_light": needs_direct_light(names)} | ({"first_hits": True} if seen_first(names) else {})
+    by_aovs = {"direct_light": needs_direct_light(names), "light_groups": needs_light_groups(names)}
+    by_aovs |= {"first_hits": True} if seen_first(names) else {}
     return Choices(**{**chosen, **by_aovs, "tests": HitTests(**_given(options, HitTests))})
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Unpack, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..aov_types import aovs_from
+from ..aov_types import LIGHT_GROUPS, OF_GROUP, aovs_from
 from ..device.open import Selectors
 from ..errors import SceneError, UsageError, did_you_mean
 from ..float_errors import with_default_errors
@@ -45,9 +45,9 @@ def each_view(
     """Render the scene from each camera in turn; BVHs and programs are kept, and memory does not grow.
 
     layers: "rgb", linear Rec. 709, 3 channels; "alpha", which makes the images transparent, and "rgb" premultiplied;
-    names of AOVs (docs/aovs.md), "instance_id" and "material_id" being "object" and "material"; "flow", 2 channels:
-    how far to the right and down, in pixels, the next view shows the point at the pixel's center, NaN where nothing is
-    hit, or where that view's lens does not image it, and in the last view.
+    names of AOVs (docs/aovs.md), with "light_groups" a layer of each group, "instance_id" and "material_id" being
+    "object" and "material"; "flow", 2 channels: how far to the right and down, in pixels, the next view shows the point
+    at the pixel's center, NaN where nothing is hit, or where that view's lens does not image it, and in the last view.
     Without "rgb" and AOVs of light, no light is computed. Raises UsageError for other layers, or for flow between
     cameras neither perspective nor fisheye, SceneError for a camera that cannot be used, and what `render` raises.
     """
@@ -77,7 +77,9 @@ def each_view(
             made |= {} if state.alpha is None else {"alpha": state.alpha}
         if "flow" in names:
             made["flow"] = _flow(made["position"], np.greater_equal(made["object"], 0), following)
-        shown = {name: made[IDS.get(name, name)] for name in names}
+        groups = [name for name in made if name.startswith(OF_GROUP)]
+        layers = [layer for name in names for layer in (groups if name == LIGHT_GROUPS else [name])]
+        shown = {name: made[IDS.get(name, name)] for name in layers}
         yield View(camera, {name: layer.reshape(*layer.shape[:2], -1) for name, layer in shown.items()})
 
 

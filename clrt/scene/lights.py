@@ -71,10 +71,12 @@ class DistantBounds(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class BaseLight(ABC):
-    """Base class of lights. kernel: its type in scene files; distant: whether it is infinitely far away."""
+    """Base class of lights. kernel: its type in scene files; distant: whether it is infinitely far away. light_group:
+    the name of the layer that its light is stored in (docs/light-groups.md), "" for the rest."""
 
     kernel: ClassVar[str]
     distant: ClassVar[bool] = False
+    light_group: str = ""
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)

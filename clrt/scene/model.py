@@ -137,7 +137,8 @@ class Environment:
 
     Direction to texel: u = atan2(x, −z)/2π mod 1, v = acos(y)/π, row 0 on top; `rotation_degrees` rotates the
     environment about +Y, counter-clockwise seen from above. Radiance = strength · (color or texel). camera_visible:
-    whether the camera sees it and the discs of the suns behind the scene; if not, it sees black there.
+    whether the camera sees it and the discs of the suns behind the scene; if not, it sees black there. light_group: the
+    name of the layer that its light is stored in (docs/light-groups.md), "" for the rest.
     """
 
     color: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
@@ -145,6 +146,7 @@ class Environment:
     strength: NonNegative = 1.0
     rotation_degrees: float = 0.0
     camera_visible: bool = True
+    light_group: str = ""
 
 
 @dataclass(eq=False, kw_only=True)

@@ -25,6 +25,9 @@ typedef struct {
     real3 caught, caught_error, bare, bare_error;   // light of those of catchers, with and without the objects
     real catcher, catcher_error;                    // the number of those
 #endif
+#if EMITTER_GROUPS
+    real3 groups[GROUPS], groups_error[GROUPS];     // light of the same samples, but of those of catchers, by light group
+#endif
 } Accumulator;
 
 static inline void two_sum(real *sum, real *error, real x) {
@@ -88,26 +91,42 @@ static inline void accumulate_bare(Accumulator *a, real3 sample, ireal counted) 
 }
 #endif
 
+#if EMITTER_GROUPS
+static inline void accumulate_group(Accumulator *a, int group, real3 sample, ireal kept) {
+    real3 L = choose(kept, sample, splat(ZERO));
+    two_sum(&a->groups[group].x, &a->groups_error[group].x, L.x);
+    two_sum(&a->groups[group].y, &a->groups_error[group].y, L.y);
+    two_sum(&a->groups[group].z, &a->groups_error[group].z, L.z);
+}
+#endif
+
 static inline Accumulator load_pixels(global const Pixel *pixels, ireal pixel) {
     WHOLE(Pixel, film, pixels);
-    return (Accumulator){GATHER3(film, pixel, .sum), GATHER3(film, pixel, .sum_error), GATHER3(film, pixel, .square),
-                         GATHER3(film, pixel, .square_error), GATHER(ureal, film, pixel, .count),
-                         GATHER(ureal, film, pixel, .dropped), GATHER(ureal, film, pixel, .rays),
+    Accumulator loaded = {GATHER3(film, pixel, .sum), GATHER3(film, pixel, .sum_error), GATHER3(film, pixel, .square),
+                          GATHER3(film, pixel, .square_error), GATHER(ureal, film, pixel, .count),
+                          GATHER(ureal, film, pixel, .dropped), GATHER(ureal, film, pixel, .rays),
 #if DIRECT_LIGHT
-                         GATHER3(film, pixel, .direct), GATHER3(film, pixel, .direct_error),
+                          GATHER3(film, pixel, .direct), GATHER3(film, pixel, .direct_error),
 #endif
 #if CLAMP
-                         GATHER(real, film, pixel, .clamped),
+                          GATHER(real, film, pixel, .clamped),
 #endif
 #if ALPHA
-                         GATHER(real, film, pixel, .alpha), GATHER(real, film, pixel, .alpha_error),
+                          GATHER(real, film, pixel, .alpha), GATHER(real, film, pixel, .alpha_error),
 #endif
 #if CATCHER
-                         GATHER3(film, pixel, .caught), GATHER3(film, pixel, .caught_error),
-                         GATHER3(film, pixel, .bare), GATHER3(film, pixel, .bare_error),
-                         GATHER(real, film, pixel, .catcher), GATHER(real, film, pixel, .catcher_error),
+                          GATHER3(film, pixel, .caught), GATHER3(film, pixel, .caught_error),
+                          GATHER3(film, pixel, .bare), GATHER3(film, pixel, .bare_error),
+                          GATHER(real, film, pixel, .catcher), GATHER(real, film, pixel, .catcher_error),
 #endif
     };
+#if EMITTER_GROUPS
+    for (int g = 0; g < GROUPS; ++g) {
+        loaded.groups[g] = GATHER3(film, pixel, .groups[g][0]);
+        loaded.groups_error[g] = GATHER3(film, pixel, .groups[g][1]);
+    }
+#endif
+    return loaded;
 }
 
 static inline void store_rows(global float *row, const real3 *value, int lane) {
@@ -147,6 +166,12 @@ static inline void store_pixels(global Pixel *film, ureal index, ireal stored, c
         store_rows(pixel->bare_error, &a->bare_error, lane);
         pixel->catcher = LANE(a->catcher, lane);
         pixel->catcher_error = LANE(a->catcher_error, lane);
+#endif
+#if EMITTER_GROUPS
+        for (int g = 0; g < GROUPS; ++g) {
+            store_rows(pixel->groups[g][0], &a->groups[g], lane);
+            store_rows(pixel->groups[g][1], &a->groups_error[g], lane);
+        }
 #endif
     }
 }

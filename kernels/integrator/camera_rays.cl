@@ -35,6 +35,15 @@ typedef struct {
 #define ALPHA_ARGUMENT(alpha)
 #endif
 
+// The light of a sample by light group, likewise.
+#if EMITTER_GROUPS
+#define GROUPS_PARAMETER , real3 *groups
+#define GROUPS_ARGUMENT(groups) , groups
+#else
+#define GROUPS_PARAMETER
+#define GROUPS_ARGUMENT(groups)
+#endif
+
 // Whether a catcher was seen, and the scene of a launch (surface/catcher.cl).
 #if CATCHER
 #define CATCHER_PARAMETER , ireal *caught

@@ -49,8 +49,10 @@ static inline void note_arrival(const Scene *scene, const Path *path, const Surf
     v->distance = hits->t;
     v->primitive = hit ? hits->primitive : (ireal)(-1);
     v->instance = hit ? hits->instance : (ireal)(0);
+    PARTS(parts)
     v->emission = add(emitted_light(scene, path, surface, hits->t, hit),
-                      escaped_light(scene, path, LIT(path, depth, escaped) CAMERA_ARGUMENT(depth == 1)));
+                      escaped_light(scene, path, LIT(path, depth, escaped) CAMERA_ARGUMENT(depth == 1)
+                                    PARTS_ARGUMENT(parts)));
 #if EMITTERS
     real pdf;
     v->emitter = hit ? surface->light : (ireal)(-1);

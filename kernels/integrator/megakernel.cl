@@ -4,11 +4,12 @@
 // INTEGRATOR provides
 //
 //   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct, &removed ALPHA_ARGUMENT(&alpha)
-//              CATCHER_ARGUMENT(&caught))
+//              CATCHER_ARGUMENT(&caught) GROUPS_ARGUMENT(groups))
 //                                         radiance along the camera rays, 0 in inactive lanes; adds the number of rays
 //                                         traced to `rays`; sets `direct` if DIRECT_LIGHT is compiled in; adds the
 //                                         energy removed by clamping to `removed` if CLAMP is, and the coverage to
-//                                         `alpha` if ALPHA is; sets `caught` if CATCHER is
+//                                         `alpha` if ALPHA is; sets `caught` if CATCHER is; adds the light by light
+//                                         group to `groups` if EMITTER_GROUPS is
 //
 // PIXEL_MIDDLE: all samples use the ray through the pixel centre.
 #include "integrator/camera_rays.cl"
@@ -39,8 +40,12 @@ kernel void megakernel(SCENE_PARAMETERS, global Pixel *film, global const uint *
 #if CATCHER
         ireal caught = NO_LANES;
 #endif
+#if EMITTER_GROUPS
+        real3 groups[GROUPS];
+        for (int g = 0; g < GROUPS; ++g) groups[g] = splat(ZERO);
+#endif
         real3 seen = seen_along(&scene, &launch, &ray, active, &sampler, &pixels.rays, &direct, &removed
-                                ALPHA_ARGUMENT(&alpha) CATCHER_ARGUMENT(&caught));
+                                ALPHA_ARGUMENT(&alpha) CATCHER_ARGUMENT(&caught) GROUPS_ARGUMENT(groups));
 #if CATCHER
         if (launch.bare) {
             accumulate_bare(&pixels, seen, own.inside);
@@ -59,6 +64,10 @@ kernel void megakernel(SCENE_PARAMETERS, global Pixel *film, global const uint *
 #endif
 #if CATCHER
         accumulate_caught(&pixels, seen, kept & caught);
+        kept = kept & !caught;
+#endif
+#if EMITTER_GROUPS
+        for (int g = 0; g < GROUPS; ++g) accumulate_group(&pixels, g, groups[g], kept);
 #endif
     }
     store_pixels(film, own.index, own.inside, &pixels);

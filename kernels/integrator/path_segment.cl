@@ -129,11 +129,15 @@ static inline real3 emitted_light(const Scene *scene, const Path *path, const Su
 }
 
 // … and the environment: the sky, and suns with a size.
-static inline real3 escaped_light(const Scene *scene, const Path *path, ireal escaped CAMERA_PARAMETER) {
+static inline real3 escaped_light(const Scene *scene, const Path *path, ireal escaped CAMERA_PARAMETER PARTS_PARAMETER) {
 #if ENVIRONMENT
     if (!ANY(escaped)) return splat(ZERO);
     real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));   // NaN in inactive lanes gives no valid texel
-    real3 light = environment_light(scene, path->p, path->n, wi, path->pdf, path->specular CAMERA_ARGUMENT(from_camera));
+    real3 light = environment_light(scene, path->p, path->n, wi, path->pdf, path->specular CAMERA_ARGUMENT(from_camera)
+                                    PARTS_ARGUMENT(parts));
+#if EMITTER_GROUPS
+    for (int g = 0; g < GROUPS; ++g) parts[g] = choose(escaped, at_eye(path, parts[g]), splat(ZERO));
+#endif
     return choose(escaped, at_eye(path, light), splat(ZERO));
 #else
     return splat(ZERO);
@@ -145,7 +149,7 @@ static inline real3 escaped_light(const Scene *scene, const Path *path, ireal es
 typedef struct {
     real3 origin, target, wi;
     ireal infinite;
-#if OPACITY
+#if OPACITY || EMITTER_GROUPS
     ireal light;           // where it ends, see transmittance
 #endif
     real3 contribution;
@@ -178,7 +182,7 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     ray->target = light.target;
     ray->wi = light.wi;
     ray->infinite = light.infinite;
-#if OPACITY
+#if OPACITY || EMITTER_GROUPS
     ray->light = number;
 #endif
 #if ATTENUATION

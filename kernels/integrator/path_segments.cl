@@ -1,11 +1,12 @@
-// A path from one of its segments to its end. direct: light from paths of at most two segments; removed: by clamps.
+// A path from one of its segments to its end. direct: light from paths of at most two segments; removed: by clamps;
+// groups: light by light group, if EMITTER_GROUPS is compiled in.
 #include "integrator/path_segment.cl"
 #include "traverse/visits.cl"
 
 // The light that a path brings from its segment `depth` on, 1 being the camera ray.
 static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path path, int depth, ireal active,
                                   Sampler *sampler, ureal *rays, real3 *direct, real *removed ALPHA_PARAMETER
-                                  CATCHER_PARAMETER) {
+                                  CATCHER_PARAMETER GROUPS_PARAMETER) {
     real3 L = splat(ZERO);
     for (;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
@@ -21,9 +22,17 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
         }
 #endif
         absorb(&path, hit ? hits.t : (real)(INFINITY));
-        L = add(L, clamped(launch, emitted_light(scene, &path, &surface, hits.t, hit), depth, removed));
-        L = add(L, clamped(launch, escaped_light(scene, &path, LIT(&path, depth, active & !hit) CAMERA_ARGUMENT(depth == 1)),
-                           depth, removed));
+        real3 emitted = clamped(launch, emitted_light(scene, &path, &surface, hits.t, hit), depth, removed);
+        L = add(L, emitted);
+        PARTS(parts)
+        real3 escaped = escaped_light(scene, &path, LIT(&path, depth, active & !hit) CAMERA_ARGUMENT(depth == 1)
+                                      PARTS_ARGUMENT(parts));
+        L = add(L, clamped(launch, escaped, depth, removed));
+#if EMITTER_GROUPS
+        add_to_group(groups, group_of(scene, surface.light), emitted);
+        real factor = clamp_factor(launch, escaped, depth);
+        for (int g = 0; g < GROUPS; ++g) groups[g] = add(groups[g], scale(parts[g], factor));
+#endif
 #if DIRECT_LIGHT
         if (depth <= 2) *direct = L;
 #endif
@@ -42,7 +51,13 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
         ShadowRay shadow;
         ireal sent = aim_at_light(scene, &path, &surface, &shading, active, sampler, &shadow);
         *rays += sent ? (ureal)(1) : (ureal)(0);
-        if (ANY(sent)) L = add(L, clamped(launch, light_along(scene, &shadow, sent), depth + 1, removed));
+        if (ANY(sent)) {
+            real3 sampled = clamped(launch, light_along(scene, &shadow, sent), depth + 1, removed);
+            L = add(L, sampled);
+#if EMITTER_GROUPS
+            add_to_group(groups, group_of(scene, shadow.light), sampled);
+#endif
+        }
 #endif
         active = go_on(&path, &surface, &shading, active, depth, launch->max_depth, sampler);
 #endif

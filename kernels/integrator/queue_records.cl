@@ -142,7 +142,7 @@ static inline Hits load_hits(const Queues *q, uint place) {
 #if SHADOWS
 static inline void store_shadow(const Queues *q, uint place, const ShadowRay *ray, uint slot) {
     global float4 *row = q->shadows + place;
-#if OPACITY
+#if OPACITY || EMITTER_GROUPS
     int light = ray->light;
 #else
     int light = -1;
@@ -162,7 +162,7 @@ static inline ShadowRay load_shadow(const Queues *q, uint place, uint *slot) {
     ray.target = xyz(target);
     ray.infinite = as_int(target.w);
     ray.wi = xyz(wi);
-#if OPACITY
+#if OPACITY || EMITTER_GROUPS
     ray.light = as_int(wi.w);
 #endif
     ray.contribution = xyz(row[3 * q->capacity]);
@@ -171,7 +171,7 @@ static inline ShadowRay load_shadow(const Queues *q, uint place, uint *slot) {
 #endif
 
 // The light of a slot: three rows of one word, three of its direct light, one of the energy removed by clamping, one of
-// its coverage, and one that is 1 if the camera sees a catcher.
+// its coverage, one that is 1 if the camera sees a catcher, and three of the light of each light group.
 #define DIRECT_ROW 3
 #if DIRECT_LIGHT
 #define REMOVED_ROW 6
@@ -189,9 +189,14 @@ static inline ShadowRay load_shadow(const Queues *q, uint place, uint *slot) {
 #define CAUGHT_ROW ALPHA_ROW
 #endif
 #if CATCHER
-#define LIGHT_ROWS (CAUGHT_ROW + 1)
+#define GROUPS_ROW (CAUGHT_ROW + 1)
 #else
-#define LIGHT_ROWS CAUGHT_ROW
+#define GROUPS_ROW CAUGHT_ROW
+#endif
+#if EMITTER_GROUPS
+#define LIGHT_ROWS (GROUPS_ROW + 3 * GROUPS)
+#else
+#define LIGHT_ROWS GROUPS_ROW
 #endif
 
 static inline real3 slot_light(const Queues *q, uint slot, uint row) {
@@ -212,11 +217,12 @@ static inline void clear_slot(const Queues *q, uint slot) {
 }
 
 // Add the contribution of a path of `edges` segments to its slot, which only this work-item uses. Direct light is that
-// of at most two segments.
-static inline void add_light(const Queues *q, const Launch *launch, uint slot, real3 found, int edges) {
+// of at most two segments. Returns what it added.
+static inline real3 add_light(const Queues *q, const Launch *launch, uint slot, real3 found, int edges) {
     real removed = ZERO;
     real3 light = clamped(launch, found, edges, &removed);
-    if (!((light.x != 0.0f) | (light.y != 0.0f) | (light.z != 0.0f))) return;   // added if NaN, which the film drops
+    // Added if NaN, which the film drops.
+    if (!((light.x != 0.0f) | (light.y != 0.0f) | (light.z != 0.0f))) return light;
     store_light(q, slot, 0, add(slot_light(q, slot, 0), light));
 #if DIRECT_LIGHT
     if (edges <= 2) store_light(q, slot, DIRECT_ROW, add(slot_light(q, slot, DIRECT_ROW), light));
@@ -224,7 +230,17 @@ static inline void add_light(const Queues *q, const Launch *launch, uint slot, r
 #if CLAMP
     q->light[slot + REMOVED_ROW * q->capacity] += removed;
 #endif
+    return light;
 }
+
+#if EMITTER_GROUPS
+// Add light to that of a light group.
+static inline void add_group_light(const Queues *q, uint slot, int group, real3 light) {
+    if (!((light.x != 0.0f) | (light.y != 0.0f) | (light.z != 0.0f))) return;
+    uint row = GROUPS_ROW + 3 * group;
+    store_light(q, slot, row, add(slot_light(q, slot, row), light));
+}
+#endif
 
 // Record that the driver ended loops of this work-item early. number: see loops_ended.
 static inline void check_loops(const Queues *q, uint number) {

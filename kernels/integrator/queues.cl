@@ -96,7 +96,10 @@ static inline void shade_hit(const Scene *scene, const Queues *q, const Launch *
 #if ALPHA
     q->light[shaded->travel.slot + ALPHA_ROW * q->capacity] += coverage(path, depth, COVERING(true, caught), false);
 #endif
-    add_light(q, launch, shaded->travel.slot, emitted_light(scene, path, &surface, hits->t, true), depth);
+    real3 emitted = add_light(q, launch, shaded->travel.slot, emitted_light(scene, path, &surface, hits->t, true), depth);
+#if EMITTER_GROUPS
+    add_group_light(q, shaded->travel.slot, group_of(scene, surface.light), emitted);
+#endif
     if (depth >= launch->max_depth) return;
 #if DISPERSION
     surface.throughput = path->beta;
@@ -138,8 +141,14 @@ kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, 
 #if ALPHA
                 q.light[shaded.travel.slot + ALPHA_ROW * q.capacity] += coverage(path, depth, false, true);
 #endif
-                add_light(&q, &launch, shaded.travel.slot, escaped_light(&scene, path, LIT(path, depth, true)
-                                                                         CAMERA_ARGUMENT(depth == 1)), depth);
+                PARTS(parts)
+                real3 escaped = escaped_light(&scene, path, LIT(path, depth, true) CAMERA_ARGUMENT(depth == 1)
+                                              PARTS_ARGUMENT(parts));
+                add_light(&q, &launch, shaded.travel.slot, escaped, depth);
+#if EMITTER_GROUPS
+                real factor = clamp_factor(&launch, escaped, depth);
+                for (int g = 0; g < GROUPS; ++g) add_group_light(&q, shaded.travel.slot, g, scale(parts[g], factor));
+#endif
             }
 #if PRIMITIVES
             else shade_hit(&scene, &q, &launch, tiles, depth, &hits, &shaded);
@@ -165,7 +174,10 @@ kernel void connect(SCENE_PARAMETERS, QUEUE_PARAMETERS, const Launch launch, con
     EACH_IN_QUEUE(i, *queued_shadows(&q, depth)) {
         uint slot;
         ShadowRay ray = load_shadow(&q, i, &slot);
-        add_light(&q, &launch, slot, light_along(&scene, &ray, true), depth + 1);
+        real3 direct = add_light(&q, &launch, slot, light_along(&scene, &ray, true), depth + 1);
+#if EMITTER_GROUPS
+        add_group_light(&q, slot, group_of(&scene, ray.light), direct);
+#endif
         check_loops(&q, i);
     }
 }
@@ -198,7 +210,12 @@ kernel void update_film(QUEUE_PARAMETERS, global Pixel *film, global const uint 
         accumulate_alpha(&pixel, q.light[slot + ALPHA_ROW * q.capacity], kept);
 #endif
 #if CATCHER
-        accumulate_caught(&pixel, slot_light(&q, slot, 0), kept & (q.light[slot + CAUGHT_ROW * q.capacity] > 0.0f));
+        ireal caught = kept & (q.light[slot + CAUGHT_ROW * q.capacity] > 0.0f);
+        accumulate_caught(&pixel, slot_light(&q, slot, 0), caught);
+        kept = kept & !caught;
+#endif
+#if EMITTER_GROUPS
+        for (int g = 0; g < GROUPS; ++g) accumulate_group(&pixel, g, slot_light(&q, slot, GROUPS_ROW + 3 * g), kept);
 #endif
     }
     store_pixels(film, own.index, true, &pixel);

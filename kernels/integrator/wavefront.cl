@@ -47,6 +47,9 @@ typedef struct {
 #if CATCHER
     float caught[WAVE];                  // 1 where the camera sees a catcher
 #endif
+#if EMITTER_GROUPS
+    float groups[3 * GROUPS][WAVE];      // radiance by light group
+#endif
     const Launch *launch;
     uint x, y, sample;                   // of slot 0
     uint dimension, rays;
@@ -65,8 +68,8 @@ static inline Sampler slot_sampler(const Wave *w, ureal slot) {
     return sampler;
 }
 
-// Add the contributions of paths of `edges` segments to their slots.
-static inline void add_light(Wave *w, ureal slot, real3 found, int edges) {
+// Add the contributions of paths of `edges` segments to their slots. Returns what it added.
+static inline real3 add_light(Wave *w, ureal slot, real3 found, int edges) {
     real removed = ZERO;
     real3 light = clamped(w->launch, found, edges, &removed);
     ireal some = (light.x != 0.0f) | (light.y != 0.0f) | (light.z != 0.0f);   // true for NaN too, which the film drops
@@ -80,7 +83,22 @@ static inline void add_light(Wave *w, ureal slot, real3 found, int edges) {
         w->removed[to] += LANE(removed, lane);
 #endif
     }
+    return light;
 }
+
+#if EMITTER_GROUPS
+// Add light to that of each lane's light group.
+static inline void add_group_light(Wave *w, ureal slot, ireal group, real3 light) {
+    ireal some = (light.x != 0.0f) | (light.y != 0.0f) | (light.z != 0.0f);
+    for (uint bits = mask_bits(some); bits; bits &= bits - 1) {
+        int lane = first_bit(bits), row = 3 * LANE_INT(group, lane);
+        uint to = LANE_UINT(slot, lane);
+        w->groups[row][to] += LANE(light.x, lane);
+        w->groups[row + 1][to] += LANE(light.y, lane);
+        w->groups[row + 2][to] += LANE(light.z, lane);
+    }
+}
+#endif
 
 #if ALPHA
 // Add values of some lanes to those of their slots.
@@ -118,6 +136,9 @@ __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int sl
 #endif
 #if CATCHER
         vstore8(ZERO, 0, w->caught + i);
+#endif
+#if EMITTER_GROUPS
+        for (int row = 0; row < 3 * GROUPS; ++row) vstore8(ZERO, 0, w->groups[row] + i);
 #endif
         dimension = sampler.dimension;
     }
@@ -165,8 +186,14 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
         Travel travel;
         LOAD(travel, w->escapes, i)
         absorb(&travel.path, (real)(INFINITY));
-        add_light(w, travel.slot, escaped_light(scene, &travel.path, LIT(&travel.path, depth, lanes_of(i, escaped))
-                                                CAMERA_ARGUMENT(depth == 1)), depth);
+        PARTS(parts)
+        real3 light = escaped_light(scene, &travel.path, LIT(&travel.path, depth, lanes_of(i, escaped))
+                                    CAMERA_ARGUMENT(depth == 1) PARTS_ARGUMENT(parts));
+        add_light(w, travel.slot, light, depth);
+#if EMITTER_GROUPS
+        real factor = clamp_factor(w->launch, light, depth);
+        for (int g = 0; g < GROUPS; ++g) add_group_light(w, travel.slot, (ireal)(g), scale(parts[g], factor));
+#endif
 #if CLEAR_GLASS
         ireal passed = lanes_of(i, escaped);
         if (depth > 1) add_to_slots(w->alpha, travel.slot, coverage(&travel.path, depth, !passed, passed), passed);
@@ -199,7 +226,10 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
         if (depth == 1) add_to_slots(w->alpha, a.travel.slot, ONE, active);
 #endif
         absorb(path, a.hits.t);
-        add_light(w, a.travel.slot, emitted_light(scene, path, &surface, a.hits.t, active), depth);
+        real3 emitted = add_light(w, a.travel.slot, emitted_light(scene, path, &surface, a.hits.t, active), depth);
+#if EMITTER_GROUPS
+        add_group_light(w, a.travel.slot, group_of(scene, surface.light), emitted);
+#endif
         if (depth >= w->launch->max_depth) continue;
 #if DISPERSION
         surface.throughput = path->beta;
@@ -230,7 +260,10 @@ __attribute__((noinline)) static void trace_shadows(const Scene *scene, Wave *w,
     for (int i = 0; i < count; i += LANES) {
         Shadow shadow;
         LOAD(shadow, w->shadows, i)
-        add_light(w, shadow.slot, light_along(scene, &shadow.ray, lanes_of(i, count)), depth + 1);
+        real3 light = add_light(w, shadow.slot, light_along(scene, &shadow.ray, lanes_of(i, count)), depth + 1);
+#if EMITTER_GROUPS
+        add_group_light(w, shadow.slot, group_of(scene, shadow.ray.light), light);
+#endif
     }
     w->rays += count;
 }
@@ -278,7 +311,12 @@ static inline void add_samples(const Wave *w, global Pixel *film, uint first_pix
             accumulate_alpha(&pixels, vload8(0, w->alpha + first), kept);
 #endif
 #if CATCHER
-            accumulate_caught(&pixels, slots_light(w->light, first), kept & (vload8(0, w->caught + first) > 0.0f));
+            ireal caught = kept & (vload8(0, w->caught + first) > 0.0f);
+            accumulate_caught(&pixels, slots_light(w->light, first), caught);
+            kept = kept & !caught;
+#endif
+#if EMITTER_GROUPS
+            for (int g = 0; g < GROUPS; ++g) accumulate_group(&pixels, g, slots_light(w->groups + 3 * g, first), kept);
 #endif
         }
         store_pixels(film, index, inside, &pixels);

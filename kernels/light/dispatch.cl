@@ -7,6 +7,7 @@
 #include MIS_WEIGHTS
 #include LIGHT_FILES
 #include LIGHT_CHOICE
+#include LIGHT_GROUPS_FILE
 
 #if LIGHTS
 // Sample a direction towards each lane's light with u.
@@ -99,6 +100,19 @@ static inline real3 escaped_radiance(const Scene *scene, real3 p, real3 n, real3
 #define HIDE_SUN(scene, sun, dark)
 #endif
 
+// With light groups, an argument for the part of each of them: an array of zeros.
+#if EMITTER_GROUPS
+#define PARTS_PARAMETER , real3 *parts
+#define PARTS_ARGUMENT(parts) , parts
+#define PARTS(parts) real3 parts[GROUPS]; for (int g = 0; g < GROUPS; ++g) parts[g] = splat(ZERO);
+#define ADD_PART(scene, emitter, light) add_to_group(parts, (ireal)(RECORD((scene)->emitter_groups, emitter)->group), light);
+#else
+#define PARTS_PARAMETER
+#define PARTS_ARGUMENT(parts)
+#define PARTS(parts)
+#define ADD_PART(scene, emitter, light)
+#endif
+
 #if ENVIRONMENT
 // Radiance along wi from the sky and all suns.
 static inline real3 environment_radiance(const Scene *scene, real3 wi CAMERA_PARAMETER) {
@@ -117,12 +131,13 @@ static inline real3 environment_radiance(const Scene *scene, real3 wi CAMERA_PAR
 // The same at p, with the radiance of each light multiplied by its MIS weight: wi was sampled by the BSDF with
 // density `pdf`, or is a specular direction, which light sampling cannot find.
 static inline real3 environment_light(const Scene *scene, real3 p, real3 n, real3 wi, real pdf, ireal specular
-                                      CAMERA_PARAMETER) {
+                                      CAMERA_PARAMETER PARTS_PARAMETER) {
     real3 light = splat(ZERO);
     real other;
 #if SKY
     real3 radiance = escaped_radiance(scene, p, n, wi, &other);
     light = scale(radiance, specular ? ONE : bsdf_sample_weight(pdf, other));
+    ADD_PART(scene, scene->counts.lights, light)
 #endif
 #if LIGHT_SUN
     int first = scene->counts.lights - scene->counts.sky_lights - scene->counts.sun_lights;
@@ -130,7 +145,9 @@ static inline real3 environment_light(const Scene *scene, real3 p, real3 n, real
         real3 disc = HIDE_SUN(scene, sun, splat(ZERO)) sun_radiance(scene, sun, wi, &other);
         if (!ANY(other > 0.0f)) continue;
         other *= light_probability(scene, p, n, (ireal)(first + sun));
-        light = add(light, scale(disc, specular ? ONE : bsdf_sample_weight(pdf, other)));
+        disc = scale(disc, specular ? ONE : bsdf_sample_weight(pdf, other));
+        ADD_PART(scene, first + sun, disc)
+        light = add(light, disc);
     }
 #endif
     return light;

@@ -258,3 +258,13 @@ def test_what_does_not_move_has_no_frames(flight: Path) -> None:
         [sys.executable, "-m", "clrt", "render", "flight.toml", "--frames", "all"], capture_output=True, text=True
     )
     assert done.returncode == 3 and "flight: has no animation; write [[keyframe]]" in done.stderr
+
+
+def test_resuming_needs_the_layers_of_light_groups(flight: Path) -> None:
+    """A frame without one of its layers' files is rendered again, and no other."""
+    flight.write_text(FLIGHT.replace("[0.3, 0.5, 0.9]", '[0.3, 0.5, 0.9], light_group = "sky"'))
+    asked = "flight.toml", "--frames", "0,1", "--aov", "light_groups", "-o", "f_#.png"
+    assert render(*asked) == ["f_0.png", "f_0.light_group.sky.png", "f_1.png", "f_1.light_group.sky.png"]
+    assert render(*asked, "--resume") == []
+    Path("f_1.light_group.sky.png").unlink()
+    assert render(*asked, "--resume") == ["f_1.png", "f_1.light_group.sky.png"]

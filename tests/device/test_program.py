@@ -149,6 +149,7 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
         *(sight for _, sight in sights(everything())),
     ):
         used |= set(compile_scene(scene, Choices()).files)
+    used |= set(compile_scene(everything(), Choices(light_groups=True)).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
     for entry in (
         "aov/denoiser_guides.cl",
@@ -184,7 +185,7 @@ def test_programs_build_without_a_warning(
     scene.spheres = scene.spheres + [
         type(scene.spheres[0])(material=material) for kind in MATERIALS for material in variants(kind)
     ]
-    compiled = compile_scene(scene, Choices(device.lanes, device.layout, direct_light=True))
+    compiled = compile_scene(scene, Choices(device.lanes, device.layout, direct_light=True, light_groups=True))
     sources = {
         "the picture's": compiled.source,
         "aov/denoiser_guides.cl": compiled.source_of("aov/denoiser_guides.cl"),

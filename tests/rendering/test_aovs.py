@@ -247,7 +247,7 @@ def test_depth_is_what_the_integrator_of_it_shows(camera: dict[str, Any]) -> Non
 
 def test_light_needs_an_integrator_of_light() -> None:
     with pytest.raises(UsageError, match="the AOVs direct and indirect store light, and the integrator is normals"):
-        clrt.render(everything(), aovs="indirect", integrator="normals")
+        clrt.render(everything(), aovs="indirect,direct", integrator="normals")
 
 
 @pytest.mark.programs

@@ -66,6 +66,7 @@ OTHER: dict[str, Any] = {
     "builder": "midpoint",
     "offset": "ulp",
     "direct_light": True,
+    "light_groups": True,
     "paths": "lanes",
     "tree": True,
     "first_hits": True,
@@ -83,7 +84,7 @@ LIGHTS = [
     SpotLight(position=(0.0, 3.0, 0.0), direction=DOWN, intensity=WHITE),
 ]
 #: The only ones that users cannot set directly.
-BY_AOVS = {"direct_light"}
+BY_AOVS = {"direct_light", "light_groups"}
 
 
 def scene(**given: Any) -> Scene:

@@ -92,7 +92,8 @@ def test_a_type_is_what_it_says(kind: type[Light]) -> None:
         found = set(light.parameters()) - {"camera_hidden"}
         assert names.setdefault(light.sampled_by, found) == found
         assert isinstance(light.bounds(), DistantBounds if kind.distant else Bounds)
-    known = {"position", "direction", "up", "image", "image_of", "falloff", "camera_visible", *STRENGTHS, *LENGTHS}
+    known = {"position", "direction", "up", "image", "image_of", "falloff", "camera_visible", "light_group"}
+    known |= {*STRENGTHS, *LENGTHS}
     assert all(field.name in known or field.name.endswith("_degrees") for field in fields(kind))
     assert {field.name for field in fields(kind)} & set(STRENGTHS)
 

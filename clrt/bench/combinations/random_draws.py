@@ -30,8 +30,8 @@ WIDE = {"roughness": (0.4, 1.0), "shininess": (0.0, 30.0), "angle_degrees": (30.
 DIM = 140
 #: Texels per side of a texture.
 TEXELS = 4
-#: Fields that make the image something else than the light of the scene.
-COMPOSITED = {"camera_visible", "catcher"}
+#: Fields that make the image something else than the light of the scene, and names of layers.
+COMPOSITED = {"camera_visible", "catcher", "light_group"}
 
 
 class Draws:

@@ -109,7 +109,7 @@ class PathRecorder:
         launch["pixel_count"], launch["sample_count"], launch["block_bits"] = pixels, 1, block_bits(1)
         launch["clamp_direct"] = launch["clamp_indirect"] = np.inf
         scene = {name: resident(device, array) for name, (_, array) in packed.buffers.items()}
-        pixel = pixel_record(self.packed.film)
+        pixel = pixel_record(self.packed.film, len(self.packed.groups))
         film = resident(device, np.zeros(self._size[0] * self._size[1], pixel))
         chosen = resident(device, tiles)
         kernel = make_kernel(device, self._program, KERNELS[MEGAKERNEL])

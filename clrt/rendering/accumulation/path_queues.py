@@ -36,7 +36,13 @@ def slot_bytes(compiled: CompiledScene) -> dict[str, int]:
         "instances": has["INSTANCES"] * WORD,
         "order": kind_count(compiled) * WORD,
         "shadows": has["LIGHTS"] * SHADOW_ROWS * ROW,
-        "light": (LIGHT_WORDS * (1 + has["DIRECT_LIGHT"]) + has["CLAMP"] + has["ALPHA"] + has["CATCHER"]) * WORD,
+        "light": (
+            LIGHT_WORDS * (1 + has["DIRECT_LIGHT"] + len(compiled.groups))
+            + has["CLAMP"]
+            + has["ALPHA"]
+            + has["CATCHER"]
+        )
+        * WORD,
         "rays": WORD,
     }
 

@@ -12,7 +12,7 @@ from ...errors import CheckpointError, OutputError, UsageError
 from ...scene.model import Scene
 from ...threads import beside
 from ..compile.choices import Choices
-from ..compile.film_record import film_features
+from ..compile.film_record import film_features, film_groups
 from .checkpoint_file import FAMILY, check_replaceable, older, read_checkpoint, write_checkpoint
 from .identity import differences, facts_of
 from .policy import CheckpointPolicy
@@ -83,9 +83,9 @@ class Checkpoints:
         end = time.perf_counter()
         self._next = end + max(self._every, COST * (end - start))
 
-    def read(self, size: tuple[int, int], features: Collection[str] = ()) -> SavedState | None:
-        """Return the newest intact state, of an image of (width, height) whose film stores what the features require,
-        or None if there is no checkpoint yet.
+    def read(self, size: tuple[int, int], features: Collection[str] = (), groups: int = 0) -> SavedState | None:
+        """Return the newest intact state, of an image of (width, height) whose film stores what the features require
+        and this many light groups, or None if there is no checkpoint yet.
 
         Raises CheckpointError if it belongs to another render, or if no generation is intact.
         """
@@ -94,7 +94,7 @@ class Checkpoints:
             try:
                 header, arrays = read_checkpoint(path, KINDS)
                 self._check_facts(path, header)
-                kept = from_arrays(header, arrays, size, features)
+                kept = from_arrays(header, arrays, size, features, groups)
             except FileNotFoundError:
                 continue
             except (OSError, ValueError) as error:
@@ -143,7 +143,9 @@ def open_checkpoints(
         return None, None
     checkpoints = Checkpoints(Path(policy.checkpoint), facts_of(scene, choices), device, policy.checkpoint_seconds)
     if policy.resume:
-        return checkpoints, checkpoints.read(scene.render.size, film_features(scene, choices))
+        return checkpoints, checkpoints.read(
+            scene.render.size, film_features(scene, choices), len(film_groups(scene, choices))
+        )
     checkpoints.warn_of_another()
     return checkpoints, None
 

@@ -84,6 +84,8 @@ def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
             continue
         if name == "direct_light":
             told.append(f"{'without' if value == 'True' else 'with'} --aov direct or indirect")
+        elif name == "light_groups":
+            told.append(f"{'without' if value == 'True' else 'with'} --aov light_groups")
         else:
             hidden = name in ("kernels", "code") or name in {field.name for field in fields(Scene)}
             told.append(f"different {name}" if hidden else f"{name} {other} instead of {value}")

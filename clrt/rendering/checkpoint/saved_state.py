@@ -23,6 +23,7 @@ FILM_PARTS = {feature: feature.lower() for feature in PARTS}
 KINDS: dict[str, np.dtype[Any]] = {
     "film": PIXEL,
     **{name: PARTS[feature] for feature, name in FILM_PARTS.items()},
+    "groups": np.dtype(np.float32),
     "samples": np.dtype(np.int64),
     "then": np.dtype(np.int64),
     "tiles": np.dtype(np.uint32),
@@ -66,16 +67,18 @@ def to_arrays(kept: SavedState) -> Arrays:
     return {name: arrays[name].astype(kind, copy=False) for name, kind in KINDS.items()}
 
 
-def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int], features: Collection[str]) -> SavedState:
-    """Return the saved state of an image of (width, height), whose film stores what these features require. Raises
-    ValueError if the parts are inconsistent."""
+def from_arrays(
+    header: dict[str, Any], arrays: Arrays, size: tuple[int, int], features: Collection[str], groups: int
+) -> SavedState:
+    """Return the saved state of an image of (width, height), whose film stores what these features require, and this
+    many light groups. Raises ValueError if the parts are inconsistent."""
     planned, seconds = header.get("planned_spp"), header.get("seconds")
     if (
         not (planned is None or type(planned) is int and planned > 0)
         or type(seconds) is not float
         or not (
             0 <= seconds < np.inf
-            and _film_fits(arrays, size, features)
+            and _film_fits(arrays, size, features, groups)
             and _work_fits(arrays, size)
             and _noise_fits(arrays, size)
         )
@@ -83,10 +86,12 @@ def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int], f
         raise ValueError(NO_SENSE)
     work = WorkQueue(arrays["samples"], arrays["then"], arrays["tiles"], map(WorkPart._make, arrays["parts"].tolist()))
     noise = NoiseEstimate(planned)
-    film = np.empty(arrays["film"].shape, pixel_record(features))
-    for part in ("film", *(FILM_PARTS[feature] for feature in features)):
+    film = np.empty(arrays["film"].shape, pixel_record(features, groups))
+    for part in ("film", *(name for feature, name in FILM_PARTS.items() if feature in features)):
         for name in arrays[part].dtype.names or ():
             film[name] = arrays[part][name]
+    if groups:
+        film["groups"] = arrays["groups"].reshape(*film.shape, groups, 2, 3)
     noise.restore(arrays["noise_mean"], arrays["noise_changes"], arrays["noise_level"])
     history = []
     for spp, second, error, relmse in arrays["history"].tolist():
@@ -102,12 +107,16 @@ def _film_parts(film: Film) -> Arrays:
         fields = list(PARTS[feature].names or ())
         has = set(fields) <= set(film.pixels.dtype.names or ())
         parts[name] = film.pixels[fields] if has else np.zeros((0, 0), PARTS[feature])
-    return parts
+    groups = film.pixels["groups"] if film.has_groups else np.zeros((0, 0, 0))
+    return {**parts, "groups": groups.reshape(*groups.shape[:2], -1) if groups.size else groups}
 
 
-def _film_fits(arrays: Arrays, size: tuple[int, int], features: Collection[str]) -> bool:
-    """Return whether the film has this size, and exactly the records that these features require."""
-    wanted = {name: size[::-1] if feature in features else (0, 0) for feature, name in FILM_PARTS.items()}
+def _film_fits(arrays: Arrays, size: tuple[int, int], features: Collection[str], groups: int) -> bool:
+    """Return whether the film has this size, and exactly the records that these features and light groups require."""
+    wanted: dict[str, tuple[int, ...]] = {
+        name: size[::-1] if feature in features else (0, 0) for feature, name in FILM_PARTS.items()
+    }
+    wanted["groups"] = (*size[::-1], 6 * groups) if groups else (0, 0, 0)
     return bool(
         arrays["film"].shape == size[::-1] and all(arrays[name].shape == shape for name, shape in wanted.items())
     )

@@ -27,8 +27,8 @@ OFFSETS = {name: f"offset/{name}.cl" for name in get_args(Offset)}
 class Choices:
     """How an image is computed; what is None suits the device (see `on`) or the scene.
 
-    direct_light: whether the film stores it separately. Raises UsageError for unknown values and for options that
-    exclude each other.
+    direct_light, light_groups: whether the film stores it, or the light of each group, separately. Raises UsageError
+    for unknown values and for options that exclude each other.
     """
 
     lanes: int | None = option(None, "SIMD width: paths per work-item.", LANES)
@@ -41,6 +41,7 @@ class Choices:
         "bound", "Offset of ray origins from the surface: its rounding error bound, a few ulps, or 0.001.", OFFSETS
     )
     direct_light: bool = False
+    light_groups: bool = False
     paths: str | None = option(
         None,
         "lanes: megakernel; waves: wavefront in each work-item (needs 8 lanes); queues: wavefront with a kernel per "

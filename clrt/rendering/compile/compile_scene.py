@@ -43,7 +43,8 @@ class CompiledScene:
 
     All points, including the camera's, are in the coordinates of `frame` (see scene.scaling). instances: the number of
     instances in the BVH; others became meshes (see scene.instancing). part_bytes: maximum size of the parts into which
-    the arrays are split, as the device has no larger buffers (kernels/core/arrays.cl). clamps: of direct and of
+    the arrays are split, as the device has no larger buffers (kernels/core/arrays.cl). groups: the light groups that
+    the film stores. clamps: of direct and of
     indirect light, infinite for none.
     """
 
@@ -60,6 +61,7 @@ class CompiledScene:
     instances: int
     objects: ObjectIds
     part_bytes: int | None = None
+    groups: tuple[str, ...] = ()
     clamps: tuple[float, float] = (inf, inf)
 
     @cached_property
@@ -107,7 +109,7 @@ class CompiledScene:
     @property
     def pixel(self) -> np.dtype[Any]:
         """Record type of a film pixel."""
-        return pixel_record(self.features)
+        return pixel_record(self.features, len(self.groups))
 
     @property
     def files(self) -> list[str]:
@@ -157,6 +159,7 @@ def compile_scene(
         len(packed.scene.instances),
         packed.shapes.objects,
         part_bytes,
+        packed.groups,
         (scene.render.clamp_direct or inf, scene.render.clamp_indirect or inf),
     )
 

@@ -21,10 +21,11 @@ from ...scene.model import Scene
 from ...threads import beside
 from .camera_kernel import camera_buffers
 from .choices import Choices
-from .film_record import film_features
+from .film_record import film_features, film_groups
 from .geometry.pack_geometry import TriangleCorners, normal_records, sphere_records, triangle_records
 from .geometry.pack_instances import ObjectIds, PackedInstances
 from .geometry.vertex_attributes import pack_corners
+from .lights.emitter_groups import pack_emitter_groups
 from .lights.environment_map import EnvironmentMap
 from .lights.pack_lights import PackedLights, pack_emitters
 from .materials.pack_materials import MaterialTables, PackedMaterials, pack_materials
@@ -114,7 +115,7 @@ class Shapes:
 @dataclass(frozen=True)
 class PackedScene:
     """Packed scene, without its program. counts: a COUNTS record; uv_sets: number of UV sets that its textures use;
-    film: what its film stores (see `film_features`)."""
+    film: what its film stores (see `film_features`); groups: the names of the light groups among that."""
 
     shapes: Shapes
     tree: Layout
@@ -125,6 +126,7 @@ class PackedScene:
     buffers: Buffers
     counts: NDArray[Any]
     film: set[str]
+    groups: tuple[str, ...]
 
     @property
     def scene(self) -> Scene:
@@ -156,8 +158,10 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: R
     if scene.render.filter != "box":
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
     counts = _counts(shapes, emitters)
-    film = film_features(scene, choices)
-    return PackedScene(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, counts, film)
+    film, groups = film_features(scene, choices), film_groups(scene, choices)
+    if groups:
+        buffers |= pack_emitter_groups(shapes.scene, emitters, groups)
+    return PackedScene(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, counts, film, groups)
 
 
 def _counts(shapes: Shapes, emitters: PackedLights) -> NDArray[Any]:

@@ -28,6 +28,8 @@ LIGHT_GROUP = record(
     center="3f4", radius="f4", axis="3f4", cos_cone="f4", intensity="f4", below="i4", above="i4", cos_reach="f4"
 )
 LIGHT_PLACE = np.dtype([("group", "i4")])
+#: The number of an emitter's light group (kernels/light/groups.cl).
+EMITTER_GROUP = np.dtype([("group", "i4")])
 #: texture: of its radiance, or −1; primitive: the triangle with its texture coordinates; double_sided: 1 if it emits
 #: from both sides.
 TRIANGLE_LIGHT = record(
@@ -122,6 +124,16 @@ CATCHER = record(
     bare_error="3f4",
     pad_bare_error="f4",
 )
+
+
+def group_record(groups: int) -> np.dtype[Any]:
+    """Return the record that follows in a film's pixels if EMITTER_GROUPS is compiled in: for each group the sum of the
+    samples' light, and its rounding error."""
+    words = 6 * groups
+    padding = {"pad_groups": f"({-words % 8},)i4"} if words % 8 else {}
+    return record(groups=f"({groups},2,3)f4", **padding)
+
+
 #: A launch of a scene with catchers; bare: whether its objects are left out.
 LAUNCH_OF_CATCHERS = np.dtype([*LAUNCH.descr, *record(bare="i4", pad_bare="3i4").descr])
 #: A projected primitive (kernels/raster/outline.cl). edge0 … nearness: functions of the image position, or for a sphere

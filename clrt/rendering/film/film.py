@@ -81,6 +81,11 @@ class Film:
         return name in (self.pixels.dtype.names or ())
 
     @property
+    def has_groups(self) -> bool:
+        """Whether it stores the light of each light group (rendering/film/group_layers.py)."""
+        return self._has("groups")
+
+    @property
     def direct(self) -> NDArray[np.float64]:
         """(height, width, 3): part of the mean due to path depths 1 and 2; only if the film stores it separately."""
         return self._mean_of("direct")

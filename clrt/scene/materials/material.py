@@ -36,6 +36,7 @@ class Material:
     - opacity: the fraction of light that interacts with the surface; the rest passes straight through
     - camera_visible: false for a surface that camera rays pass through, also where it emits; all others hit it
     - catcher: the image does not show the surface, but what the scene's other surfaces change about its light
+    - light_group: the name of the layer that what it emits is stored in (docs/light-groups.md), "" for the rest
     - alpha_cutoff (alpha mask): the surface is opaque where the opacity reaches it, and absent elsewhere
     """
 
@@ -50,6 +51,7 @@ class Material:
     double_sided: bool = False
     camera_visible: bool = True
     catcher: bool = False
+    light_group: str = ""
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)

@@ -14,6 +14,7 @@ from ...errors import SceneError
 from ..fields.limits import Ge, Le
 from ..fields.tuples import tuples_for_lists
 from ..geometry.transform import unit
+from ..light_groups import name_problems
 from ..lights import DirectionalLight, Light
 from ..materials.textures import NonNegative
 from ..model import Environment, Scene, Vector
@@ -47,6 +48,8 @@ class Sky:
     - ground: whether the lower half is the ground of this albedo, as sky and sun light it, or black.
     - sky_strength, sun_strength: factors; 0 leaves one out.
     - sun_angle_degrees: the angular diameter of the sun's disc, which does not change its irradiance.
+    - light_group, sun_light_group: names of the layers that their light is stored in (docs/light-groups.md); the sun is
+      in the sky's group if it has none of its own.
     - hours_per_second: in the frames of an animation, how fast `time` passes from frame 0 on.
     """
 
@@ -62,6 +65,8 @@ class Sky:
     sun_strength: NonNegative = 1.0
     sun_angle_degrees: Annotated[float, Ge(0), Le(90)] = SUN_DEGREES
     hours_per_second: float = 0.0
+    light_group: str = ""
+    sun_light_group: str = ""
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
@@ -114,13 +119,16 @@ class Sky:
             towards = sin(radians(self.position.elevation))
             irradiance = horizontal_irradiance(image) + towards * np.array(self.irradiance)
             image[len(image) // 2 :] = np.array(self.albedo) / pi * irradiance
-        return SkyEnvironment(image=image, sky=self)
+        return SkyEnvironment(image=image, light_group=self.light_group, sky=self)
 
     def lights(self) -> list[Light]:
         """Return the sun; an empty list if it does not shine."""
         x, y, z = self.towards_sun
         sun: Light = DirectionalLight(
-            direction=(0 - x, 0 - y, 0 - z), irradiance=self.irradiance, angle_degrees=self.sun_angle_degrees
+            direction=(0 - x, 0 - y, 0 - z),
+            irradiance=self.irradiance,
+            angle_degrees=self.sun_angle_degrees,
+            light_group=self.sun_light_group or self.light_group,
         )
         return [] if sun.is_black else [sun]
 
@@ -142,6 +150,8 @@ class Sky:
             yield f"sky: has both a sun_direction and {also[0]}; keep one of them"
         elif not any(self.sun_direction):
             yield "sky.sun_direction: [0, 0, 0] is not a direction; write the one towards the sun"
+        for name in ("light_group", "sun_light_group"):
+            yield from name_problems(getattr(self, name), f"sky.{name}")
         if self.time is not None and self.time.utcoffset() is None:
             yield f"sky.time: {show(self.time)} has no offset from UTC; write one, such as {show(self.time)}+02:00"
 

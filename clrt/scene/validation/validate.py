@@ -13,8 +13,9 @@ from ..animation import Animation, ModelAnimation, SceneAnimation
 from ..camera_path import animation_problems
 from ..cameras import CALIBRATED
 from ..geometry.instancing import painted
+from ..light_groups import name_problems
 from ..light_images import LightImage
-from ..lights import LIGHTS
+from ..lights import LIGHTS, Light
 from ..materials.material_types import MATERIALS, Diffuse, Material
 from ..model import Backdrop, Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere
 from .field_types import field_problems, show
@@ -54,6 +55,7 @@ def scene_problems(scene: Scene) -> list[str]:
             [] if problems else animation_problems(scene.camera, animation)
         )
     problems += _image_problems(scene.environment, Environment, "environment")
+    problems += _group_problems(scene.environment, "environment")
     problems += [] if scene.backdrop is None else _image_problems(scene.backdrop, Backdrop, "backdrop")
     problems += _object_problems(scene.render, RenderSettings, "render") or _raster_problems(scene)
     problems += _local_problems(scene)
@@ -230,8 +232,15 @@ def _material_problems(users: list[tuple[str, Mesh | Sphere | Instance]]) -> lis
         found = _object_problems(material, Material, where)
         if isinstance(material, Material) and not found:
             found = [f"{where}.{conflict}" for conflict in material.conflicts()] + _catcher_problems(material, where)
+            found += _group_problems(material, where)
         problems += found
     return problems
+
+
+def _group_problems(emitter: Material | Light | Environment, where: str) -> list[str]:
+    """Return a problem if layers cannot have the name of its light group."""
+    name: object = emitter.light_group  # of another type it is a problem already
+    return name_problems(name, f"{where}.light_group") if isinstance(name, str) else []
 
 
 def _catcher_problems(material: Material, where: str) -> list[str]:
@@ -337,7 +346,7 @@ def _light_problems(light: object, where: str) -> list[str]:
     if not isinstance(light, LIGHTS):
         return [f"{where}: {show(light)} is not a light; write a {' or '.join(kind.__name__ for kind in LIGHTS)}"]
     problems = _object_problems(light, type(light), where) + _shown_problems(getattr(light, "image", None), where)
-    return problems or [f"{where}.{conflict}" for conflict in light.conflicts()]
+    return problems or [f"{where}.{conflict}" for conflict in light.conflicts()] + _group_problems(light, where)
 
 
 def _shown_problems(image: object, where: str) -> list[str]:
