@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .output.image import Image as Image
     from .output.image_error import compare as compare
     from .output.images import read_image as read_image
+    from .output.relighting import relight as relight
     from .output.scenes import save_scene as save_scene
     from .queries.instanced import InstancedRayQuery as InstancedRayQuery
     from .queries.mesh import RayQuery as RayQuery
@@ -89,6 +90,7 @@ _HOME = {
     "output.image_error": ("compare",),
     "output.image": ("Image",),
     "output.images": ("read_image",),
+    "output.relighting": ("relight",),
     "output.scenes": ("save_scene",),
     "queries.mesh": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),

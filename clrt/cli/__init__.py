@@ -21,7 +21,20 @@ STARTED = time.perf_counter()
 PROGRAM = "clrt"
 #: Number of new objects that triggers garbage collection.
 OBJECTS = 100_000
-COMMANDS = ("render", "view", "bake", "info", "debug", "convert", "compare", "devices", "bench", "cache", "doctor")
+COMMANDS = (
+    "render",
+    "view",
+    "bake",
+    "relight",
+    "info",
+    "debug",
+    "convert",
+    "compare",
+    "devices",
+    "bench",
+    "cache",
+    "doctor",
+)
 
 
 class _Commands(CommandGroup):

@@ -57,6 +57,24 @@ class Assignment(click.ParamType[tuple[str, str]]):
         return name, text
 
 
+class Factors(click.ParamType[tuple[str, tuple[float, ...]]]):
+    """NAME=FACTOR, or NAME=R,G,B."""
+
+    name = "NAME=FACTOR"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, context: click.Context | None
+    ) -> tuple[str, tuple[float, ...]]:
+        name, _, text = str(value).partition("=")
+        try:
+            numbers = tuple(map(float, text.split(",")))
+        except ValueError:
+            numbers = ()
+        if not name or len(numbers) not in (1, 3):
+            self.fail(f"{value!r} gives no factor; write NAME=FACTOR or NAME=R,G,B, e.g. key=0.5", param, context)
+        return name, numbers
+
+
 class OneOf(click.Choice[Any]):
     """One of several words, which the error for a misspelled one suggests."""
 

@@ -24,6 +24,7 @@ DECODERS = {
     "image": "clrt.formats.images.stored_images:image",
     "avif": "clrt.formats.images.stored_images:avif",
     "basis": "clrt.formats.images.stored_images:basis",
+    "layers": "clrt.formats.images.stored_images:layers",
     "draco": "clrt.formats.gltf.draco_mesh:decode",
     "3mf": "clrt.formats.threemf.package:decode",
     "usd": "clrt.formats.usd.stage:decode",

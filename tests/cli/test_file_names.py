@@ -61,6 +61,7 @@ CALLS: dict[str, tuple[tuple[str, ...], set[str]]] = {
     "debug": (("debug", f"{NAME}.obj", "--pixel", "3,3", "--json"), set()),
     "convert": (("convert", "model.obj", f"{NAME}3.toml"), {"3.toml"}),
     "compare": (("compare", f"{NAME}.exr", f"{NAME}.exr", "--json"), set()),
+    "relight": (("relight", f"{NAME}.exr", "-o", f"{NAME}5.png"), {"5.png"}),
     "doctor": (("doctor", "-o", f"{NAME}4.json"), {"4.json"}),
     "devices": (("devices", "--json"), set()),
     "cache": (("cache",), set()),
@@ -81,7 +82,8 @@ def folder(tmp_path: Path) -> Path:
     (path / "model.obj").write_text(MODEL.replace("\xe9", "m"))
     (path / os.fsdecode(b"\xe9.mtl")).write_text("newmtl \xe9\nmap_Kd \xe9.png\n", encoding="latin-1")
     for name in (f"{NAME}.exr", os.fsdecode(b"\xe9.png")):
-        write_image(path / name, np.full((4, 4, 3), 0.25, np.float32))
+        grey = np.full((4, 4, 3), 0.25, np.float32)
+        write_image(path / name, grey, aovs={"light_group.key": grey} if name.endswith(".exr") else None)
     return path
 
 

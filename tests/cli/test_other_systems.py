@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from clrt.cli import COMMANDS
+from clrt.output.images import write_image
 
 from ..covering import others
 
@@ -23,6 +24,7 @@ CALLS = {
     "debug": ("debug", "scene.toml", "--pixel", "5,5"),
     "info": ("info", "scene.toml"),
     "bake": ("bake", str(TEXTURES), "--mesh", "table", "--size", "8x8", "--spp", "16", "-q", "-o", "baked.png"),
+    "relight": ("relight", "groups.exr", "--group", "key=2", "-o", "brighter.png"),
     "convert": ("convert", "model.obj", "other.toml"),
     "compare": ("compare", "red.png", "red.png"),
     "devices": ("devices", "--check"),
@@ -44,6 +46,8 @@ def folder(tmp_path: Path) -> Path:
         encoding="utf-8",
     )
     (tmp_path / "model.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="utf-8")
+    ones = np.ones((8, 8, 3), np.float32)
+    write_image(tmp_path / "groups.exr", ones, aovs={"light_group.key": ones})
     imageio.v3.imwrite(tmp_path / "red.png", np.full((8, 8, 3), (255, 0, 0), np.uint8))
     return tmp_path
 
@@ -55,11 +59,14 @@ def test_every_command_is_called() -> None:
 @pytest.mark.parametrize(
     ("system", "name"),
     [
-        *(("win32", name) for name in ("render", "bake", "convert", "compare", "cache", "view")),
+        *(("win32", name) for name in ("render", "bake", "relight", "convert", "compare", "cache", "view")),
         *(("darwin", name) for name in ("render", "debug", "doctor")),
         *others(*(("win32", name) for name in ("debug", "info", "devices", "doctor", "bench"))),
         *others(
-            *(("darwin", name) for name in ("bake", "convert", "compare", "cache", "view", "info", "devices", "bench"))
+            *(
+                ("darwin", name)
+                for name in ("bake", "relight", "convert", "compare", "cache", "view", "info", "devices", "bench")
+            )
         ),
     ],
 )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...file_names import StrPath
-from ..decoder import decode
+from ..decoder import Arrays, decode
 from ..referenced_files import check_file
 from .radiance_hdr import read_radiance
 
@@ -42,6 +42,15 @@ def read_layers(path: StrPath) -> tuple[NDArray[np.float32], NDArray[np.float32]
     Alpha of float files is associated, that of others is not."""
     pixels, alpha, associated = _read_linear(Path(path))
     return (pixels if alpha is None or associated else pixels * alpha[..., None]), alpha
+
+
+def read_named_layers(path: StrPath, prefix: str) -> dict[str, NDArray[np.float32]]:
+    """Return the layers of an image file whose names begin with `prefix`, (h, w, 3) float32 by the rest of their names,
+    sorted. Raises SceneError as `read_picture`, but not if there are none."""
+    path = Path(path)
+    _check_stored(path)
+    arrays, _ = _decoded("layers", path, str(path), prefix=prefix)
+    return dict(sorted(arrays.items()))
 
 
 def _read_linear(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float32] | None, bool]:
@@ -99,13 +108,21 @@ def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], str]:
             f"{name}: is compressed with Basis Universal, whose decoder is not installed; "
             "pip install opengl-basisu, or export the textures as PNG or JPEG"
         )
+    arrays, facts = _decoded(DECODERS.get(suffix, "image"), source, name, suffix)
+    return arrays["pixels"], facts["channels"]
+
+
+def _decoded(
+    kind: str, source: Path | bytes, name: str, suffix: str = "", **options: Any
+) -> tuple[Arrays, dict[str, Any]]:
+    """Return what the decoder does. Raises SceneError that begins with `name`."""
     try:
-        arrays, facts = decode(DECODERS.get(suffix, "image"), source, suffix)
+        arrays, facts = decode(kind, source, suffix, **options)
     except SceneError as error:
         raise SceneError(f"{name}: cannot be decoded as an image: {error}") from None
     if "refused" in facts:
         raise SceneError(f"{name}: {facts['refused']}")
-    return arrays["pixels"], facts["channels"]
+    return arrays, facts
 
 
 def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:

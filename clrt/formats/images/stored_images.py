@@ -66,6 +66,24 @@ def image(file: str) -> Found:
     return {"pixels": pixels.astype(np.float32) if dtype == np.uint32 else pixels}, {"channels": names}
 
 
+def layers(file: str, prefix: str) -> Found:
+    """Return the layers of an image whose names begin with `prefix`, (h, w, 3) float32, by the rest of their names."""
+    import OpenImageIO as oiio
+
+    buffer = _opened(file, 0)
+    spec = buffer.nativespec()
+    places = {name: place for place, name in enumerate(spec.channelnames)}
+    names = [name.removesuffix(".R") for name in places if name.startswith(prefix) and name.endswith(".R")]
+    wanted = {name: [places.get(f"{name}.{channel}", -1) for channel in "RGB"] for name in names}
+    if spec.deep or any(-1 in each for each in wanted.values()):
+        return {}, {"refused": "is a deep image, or has a layer without one of R, G and B"}
+    check_size(file, spec.width, spec.height, spec.width * spec.height * len(places) * 4)
+    pixels = buffer.get_pixels(oiio.FLOAT) if wanted else None
+    if buffer.has_error:
+        raise ValueError(_complaint(buffer))
+    return {} if pixels is None else {name[len(prefix) :]: pixels[..., each] for name, each in wanted.items()}, {}
+
+
 def _parts(file: str) -> list[Any]:
     """Return the specification of each part of an OpenEXR file; of other files, that of the first image."""
     first = _opened(file, 0)
