@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 PROPERTIES = (
     "additivity",
+    "groups",
     "strategies",
     "choice",
     "integrators",
@@ -67,12 +68,12 @@ def combinations_command(
     """Test identities of rendered images on random scenes.
 
     The scenes combine all materials, lights, cameras and textures at random. Properties: the image with all lights is
-    the sum of the images with one light each (additivity); BSDF sampling, light sampling and both together have the
-    same mean (strategies), and so has choosing lights uniformly (choice); path at depth 2 agrees with direct, local and
-    raster (integrators); brighter light makes a proportionally brighter image (brightness); the image stays the same if
-    a scene and its camera are moved, rotated, mirrored or scaled (similarity), if meshes are split or instanced
-    (partition), and if objects out of view are added (bystanders). The exit code is 1 if a scene violates a property
-    significantly.
+    the sum of the images with one light each (additivity); a light group's layer is the image with its lights alone
+    (groups); BSDF sampling, light sampling and both together have the same mean (strategies), and so has choosing
+    lights uniformly (choice); path at depth 2 agrees with direct, local and raster (integrators); brighter light makes
+    a proportionally brighter image (brightness); the image stays the same if a scene and its camera are moved, rotated,
+    mirrored or scaled (similarity), if meshes are split or instanced (partition), and if objects out of view are added
+    (bystanders). The exit code is 1 if a scene violates a property significantly.
     """
     from ..bench.combinations.combinations import keep_scenes, verdicts
     from ..device.open import open_device

@@ -23,6 +23,8 @@ from ...output.scenes import save_scene
 from ...rendering.accumulation.launch_plan import LaunchPlan
 from ...rendering.accumulation.single_device import SingleDeviceAccumulation
 from ...rendering.compile.compile_scene import compile_scene
+from ...rendering.film.film import Film
+from ...rendering.film.group_layers import group_layers
 from ..kernel_probe import choices
 from ..renderers.agreement import block_means
 from ..significance import FAMILY, corrected, t_test
@@ -157,10 +159,15 @@ def _means(device: Device, side: Side, spp: int, seeds: Sequence[int]) -> tuple[
     return np.asarray(side.scale * np.sum([rows for rows, _ in rendered], 0)), sum(dropped for _, dropped in rendered)
 
 
+def _layer(film: Film, groups: Sequence[str], group: str) -> Doubles:
+    return group_layers(film, groups)[groups.index(group)].astype(np.float64)
+
+
 def _rendered(device: Device, side: Side, number: int, spp: int, seeds: Sequence[int]) -> tuple[Doubles, int]:
     """Return the same for one of the side's scenes."""
     scene = side.scenes[number]
-    compiled = compile_scene(scene, choices(device), device=device)
+    chosen = replace(choices(device), light_groups=side.group is not None)
+    compiled = compile_scene(scene, chosen, device=device)
     files = {name: side.files.get(name, own) if own else own for name, own in compiled.chosen_files.items()}
     session = SingleDeviceAccumulation(device, replace(compiled, chosen_files=files), LaunchPlan.of(scene.render, spp))
     rows, dropped = [], 0
@@ -170,7 +177,8 @@ def _rendered(device: Device, side: Side, number: int, spp: int, seeds: Sequence
         for _ in session.render(spp):
             pass
         film = session.film()
-        pixels = film.mean[:, ::-1] if side.mirrored else film.mean
+        image = film.mean if side.group is None else _layer(film, compiled.groups, side.group)
+        pixels = image[:, ::-1] if side.mirrored else image
         rows.append(np.append(block_means(pixels, BLOCK).ravel(), pixels.mean((0, 1))))
         dropped += film.nonfinite_samples
     return np.array(rows), dropped

@@ -14,6 +14,7 @@ import numpy as np
 from ...device.programs.kernel_files import kernel_folder
 from ...scene.geometry.instancing import baked
 from ...scene.geometry.transform import rotation, scaling, transform_mesh, translation
+from ...scene.light_groups import group_of, light_groups
 from ...scene.lights import STRENGTHS, DirectionalLight, Light
 from ...scene.materials.material import Material
 from ...scene.materials.material_types import MATERIALS, Diffuse
@@ -25,12 +26,16 @@ from .random_draws import Draws
 from .random_scenes import BLACK
 from .similarity import random_similarity
 
+#: Names of light groups; without a name a light is in the rest's.
+GROUPS = ("", "key", "fill")
+
 Lit = TypeVar("Lit", Mesh, Instance, Sphere)
 
 
 @dataclass(frozen=True)
 class Side:
-    """One side of an equation: `scale` times the sum of the scenes' images.
+    """One side of an equation: `scale` times the sum of the scenes' images, or of their layers of the light group
+    `group`.
 
     files: kernel files that replace the program's own, by their name in `#include NAME`; mirrored: left and right are
     exchanged.
@@ -41,6 +46,7 @@ class Side:
     files: Mapping[str, list[str]] = field(default_factory=dict)
     scale: float = 1.0
     mirrored: bool = False
+    group: str | None = None
 
 
 Property = Callable[[Scene, Draws], list[Side]]
@@ -49,6 +55,13 @@ Property = Callable[[Scene, Draws], list[Side]]
 def additivity(scene: Scene, draws: Draws) -> list[Side]:
     """The image in all lights is the sum of the images in each light alone."""
     return [Side("all lights", [scene]), Side("one light each", list(single_lights(scene)))]
+
+
+def groups(scene: Scene, draws: Draws) -> list[Side]:
+    """The layer of a light group is the image in the lights of this group alone."""
+    grouped = in_groups(scene, draws)
+    group = draws.one_of(light_groups(grouped))
+    return [Side(f"the layer {group}", [grouped], group=group), Side("its lights alone", [only_lit(grouped, group)])]
 
 
 def strategies(scene: Scene, draws: Draws) -> list[Side]:
@@ -125,7 +138,7 @@ def bystanders(scene: Scene, draws: Draws) -> list[Side]:
 #: Properties by name.
 PROPERTIES: dict[str, Property] = {
     each.__name__: each
-    for each in (additivity, strategies, choice, integrators, brightness, similarity, partition, bystanders)
+    for each in (additivity, groups, strategies, choice, integrators, brightness, similarity, partition, bystanders)
 }
 #: Properties with moderate scenes (see Draws), because one side does without a sampling strategy.
 MODERATE = {"strategies", "choice", "integrators"}
@@ -141,6 +154,28 @@ def single_lights(scene: Scene) -> Iterator[Scene]:
     emissive = {id(each): each for each in _materials(scene) if any(each.radiance)}
     for own in emissive.values():
         yield with_materials(replace(dark, **_users(scene)), lambda each: each if each is own else _times(each, 0.0))
+
+
+def in_groups(scene: Scene, draws: Draws) -> Scene:
+    """Return the scene with each of its lights, its environment and its emissive materials in one of GROUPS."""
+    lights: list[Light] = [replace(light, light_group=draws.one_of(GROUPS)) for light in scene.lights]
+    environment = replace(scene.environment, light_group=draws.one_of(GROUPS))
+    names = {id(each): draws.one_of(GROUPS) for each in _materials(scene) if any(each.radiance)}
+    return with_materials(
+        replace(scene, lights=lights, environment=environment),
+        lambda each: replace(each, light_group=names[id(each)]) if id(each) in names else each,
+    )
+
+
+def only_lit(scene: Scene, group: str) -> Scene:
+    """Return the scene in the lights of a light group alone."""
+    dark = brighter(scene, 0.0)
+    lights = [light for light in scene.lights if group_of(light.light_group) == group]
+    environment = scene.environment if group_of(scene.environment.light_group) == group else dark.environment
+    return with_materials(
+        replace(dark, **_users(scene), lights=lights, environment=environment),
+        lambda each: each if group_of(each.light_group) == group else _times(each, 0.0),
+    )
 
 
 def brighter(scene: Scene, factor: float) -> Scene:
