@@ -19,6 +19,7 @@ PAGES = {
     "light-measurements": (2, ()),
     "bake": (3, ("light.exr", "light.png", "light.json", "occlusion.png", "table.exr")),
     "sky": (2, ("noon.png", "outside.toml", "hour_09.png", "hour_21.png")),
+    "light-groups": (2, ("night.exr", "moonlit.png", "dimmed.png")),
     "dataset": (4, ("view_0003.exr", "spot/transforms.json", "spot/images/view_00003.png")),
 }
 
