@@ -117,7 +117,7 @@ def test_it_ends_at_the_same_error(cluster: Cluster, small_tasks: None, adaptive
 
 def test_pictures_beside_it(cluster: Cluster) -> None:
     """AOVs and guides are rendered by a worker."""
-    names = ["direct", "albedo", "depth"]
+    names = ["direct", "light_groups", "albedo", "depth"]
     expected, found = alone(room(), aovs=names), together(cluster, room(), 1, aovs=names)
     for name, picture in expected.aovs(run(expected, spp=4)).items():
         np.testing.assert_array_equal(picture, found.aovs(run(found, spp=4))[name])
