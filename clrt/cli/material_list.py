@@ -89,7 +89,7 @@ def _values(hint: Any) -> Iterator[str]:
         )
         yield f"a number {limits}"
     else:
-        yield {bool: "true or false", Texture: "a texture", float: "a number"}[hint]
+        yield {bool: "true or false", str: "text", Texture: "a texture", float: "a number"}[hint]
 
 
 def _field_line(field: dict[str, Any]) -> str:
