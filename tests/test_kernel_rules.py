@@ -111,9 +111,9 @@ FRAGILE = {
     "variables of a program": r"^(?:static )?global\b[^(;]*;",
     "inline assembly": r"\basm\b",
 }
-#: Files that unroll loops, whose bodies are short: polynomials, words of a state, cache lines to prefetch.
-UNROLLING = {"bsdf/ggx_albedo.cl", "integrator/compaction.cl", "core/mask.cl"}
-UNROLL = re.compile(r'_Pragma\("unroll"\)')
+#: Files that unroll loops, whose bodies are short: polynomials, texels, words of a state, cache lines to prefetch.
+UNROLLING = {"bsdf/ggx_albedo.cl", "core/bilinear.cl", "core/lanes.cl", "core/mask.cl", "integrator/compaction.cl"}
+UNROLL = re.compile(r'_Pragma\("unroll"\)|\bUNROLLED\b')
 
 
 def fragile(text: str) -> list[str]:
