@@ -23,11 +23,13 @@ if TYPE_CHECKING:
         ClrtError as ClrtError,
         DeviceError as DeviceError,
         KernelError as KernelError,
+        ObjectError as ObjectError,
         OutputError as OutputError,
         SceneError as SceneError,
         UsageError as UsageError,
     )
     from .output.datasets.save_views import save_views as save_views
+    from .output.denoise import denoise as denoise
     from .output.image import Image as Image
     from .output.image_error import compare as compare
     from .output.images import read_image as read_image
@@ -84,9 +86,19 @@ _HOME = {
     "baking.bake": ("bake",),
     "baking.light_map": ("LightMap",),
     "device.discovery.discover": ("devices",),
-    "errors": ("CheckpointError", "ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
+    "errors": (
+        "CheckpointError",
+        "ClrtError",
+        "DeviceError",
+        "KernelError",
+        "ObjectError",
+        "OutputError",
+        "SceneError",
+        "UsageError",
+    ),
     "queries.instanced": ("InstancedRayQuery",),
     "output.datasets.save_views": ("save_views",),
+    "output.denoise": ("denoise",),
     "output.image_error": ("compare",),
     "output.image": ("Image",),
     "output.images": ("read_image",),

@@ -3,6 +3,7 @@
     ClrtError
     ├── UsageError    a wrong option or combination of options        exit code 2
     ├── SceneError    a scene, model or image file, or its content    exit code 3
+    │   └── ObjectError  an object of a scene, when it is made        exit code 3
     ├── CheckpointError  a checkpoint that cannot be resumed          exit code 3
     ├── DeviceError   no such device, or the device failed            exit code 4
     │   ├── NoRoomError  the device has not enough memory             exit code 4
@@ -40,6 +41,22 @@ class SceneError(ClrtError):
     def __init__(self, problems: str | list[str]) -> None:
         self.problems = [problems] if isinstance(problems, str) else list(problems)
         super().__init__("\n".join(self.problems))
+
+
+class ObjectError(SceneError):
+    """An object of a scene cannot be made of these values. `faults`: the problems without the object's name before
+    them."""
+
+    def __init__(self, name: str, faults: list[str]) -> None:
+        self.name, self.faults = name, list(faults)
+        super().__init__(self.named(name))
+
+    def named(self, name: str) -> list[str]:
+        """Return the problems with another name for the object, such as its place in a file."""
+        return [f"{name}{fault}" for fault in self.faults]
+
+    def __reduce__(self) -> tuple[type, tuple[str, list[str]]]:
+        return type(self), (self.name, self.faults)
 
 
 class CheckpointError(ClrtError):

@@ -18,10 +18,10 @@ from ..rendering.compile.choices import Choices
 from ..rendering.light_meter import LightMeter, LightPart
 from ..rendering.listed_keywords import listed
 from ..rendering.sensors import SensorOptions, reach_of
+from ..scene.fields.field_types import show
 from ..scene.model import Instance, Mesh, Scene
 from ..scene.ray_list import REPLICAS, RayList
 from ..scene.render_settings import RenderSettings
-from ..scene.validation.field_types import show
 from ..scene.validation.validate import check_is_scene, validate
 from .light_map import LightMap
 from .padding import padded

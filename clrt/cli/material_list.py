@@ -8,12 +8,12 @@ from dataclasses import fields
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
+from ..scene.fields.field_types import show
 from ..scene.fields.limits import Ge, Gt, Le, Lt
 from ..scene.materials.material import SHARED
 from ..scene.materials.material_types import MATERIALS, Material
 from ..scene.materials.presets import CONDUCTORS, F0_PRESETS
 from ..scene.materials.textures import Texture
-from ..scene.validation.field_types import show
 
 #: Descriptions of limits.
 LIMITS = {Ge: "at least", Gt: "above", Le: "at most", Lt: "below"}

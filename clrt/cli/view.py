@@ -47,7 +47,7 @@ def command(
     from ..device.discovery.discover import select
     from ..live.settings import Settings
     from ..output.view_transform import check_view
-    from ..scene.validation.field_types import field_problems
+    from ..scene.fields.field_types import field_problems
     from ..window.app import App, DisplaySettings
 
     check_view(view, exposure)

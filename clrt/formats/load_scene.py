@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import sys
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -78,7 +79,8 @@ def load(
         reader = partial(_APPROXIMATING[_suffix(path)], approximate=True)
     if parameters:
         reader = partial(_load_mitsuba, approximate=approximate, parameters=parameters)
-    scene, problems = reader(path) if reader else (_load_model(path, camera, up, unit, choice, moving), [])
+    with _named(path):
+        scene, problems = reader(path) if reader else (_load_model(path, camera, up, unit, choice, moving), [])
     views = [] if reader else [name for name in VIEWS if name not in scene.cameras]
     if camera is not None and camera not in views:
         scene.camera = scene.cameras.get(camera, scene.camera)
@@ -185,14 +187,23 @@ def _load_pbrt(path: Path, approximate: bool = False) -> tuple[Scene, list[str]]
 
 
 def _warned(path: Path, read: Callable[[], tuple[Scene, list[str]]]) -> tuple[Scene, list[str]]:
-    """Return the scene of a reader, and log the differences that it returns. Raises SceneError naming the file."""
-    try:
-        scene, differences = read()
-    except SceneError as error:
-        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+    """Return the scene of a reader, and log the differences that it returns."""
+    scene, differences = read()
     for difference in differences:
         log.warning("%s: %s", path, difference)
     return scene, []
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Name the file in problems that do not."""
+    try:
+        yield
+    except SceneError as error:
+        start = f"{path}: "
+        raise SceneError(
+            [problem if problem.startswith(start) else f"{start}{problem}" for problem in error.problems]
+        ) from None
 
 
 def _suffix(path: Path) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 from ..errors import SceneError, UsageError
 from ..scene.axes_and_units import LightUnit
-from ..scene.validation.field_types import field_problems, show
+from ..scene.fields.field_types import field_problems, show
 
 Named = str | int
 

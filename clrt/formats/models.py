@@ -21,7 +21,6 @@ from ..scene.geometry.instancing import baked
 from ..scene.geometry.normals import Normals, choose_normals
 from ..scene.materials.material_types import Diffuse
 from ..scene.model import Instance, Mesh, Model, Vector
-from ..scene.validation.validate import mesh_problems
 from .far_origin import far_center
 from .images.image_reader import linear_from_srgb
 from .model_choice import DEFAULT, ModelChoice
@@ -202,8 +201,6 @@ def _mesh(path: Path, name: str, piece: dict[str, Any], normals: Normals, center
         uv=uv,
         colors=colors,
     )
-    if problems := mesh_problems(mesh, "mesh"):
-        raise SceneError(problems)
     mesh.normals = choose_normals(normals, vertices, mesh.faces, stored)
     return mesh
 

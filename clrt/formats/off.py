@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from ..file_names import printable
-from ..scene.validation.validate import index_problems
+from ..scene.geometry.mesh_faults import index_problems
 from .plain_text import plain_text
 from .ply.elements import Lists
 from .ply.triangles import Triangles

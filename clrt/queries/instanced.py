@@ -17,7 +17,7 @@ from ..float_errors import with_default_errors
 from ..scene.fields.number_arrays import real_array, whole_array
 from ..scene.geometry.mesh_arrays import mesh_arrays
 from ..scene.geometry.scaling import SceneFrame, frame_around, unit_for
-from ..scene.geometry.transform import transform_faults
+from ..scene.geometry.transform_faults import transform_faults
 from .base import TreeQuery
 
 Doubles = NDArray[np.float64]

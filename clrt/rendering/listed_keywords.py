@@ -13,7 +13,7 @@ from types import NoneType
 from typing import Annotated, Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from ..errors import UsageError
-from ..scene.validation.field_types import unknown
+from ..scene.fields.field_types import unknown
 
 F = TypeVar("F", bound=Callable[..., Any])
 

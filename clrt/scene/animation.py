@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from .fields.limits import Gt, Lt
-from .fields.tuples import tuples_for_lists
+from .fields.validated import Validated
 from .materials.textures import NonNegative
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ Positive = Annotated[float, Gt(0)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Keyframe:
+class Keyframe(Validated):
     """The camera's fields (see `Camera`) at a `time` in seconds.
 
     A field that is None is interpolated between the keyframes that set it, and keeps the camera's own value if none
@@ -35,12 +35,9 @@ class Keyframe:
     focus_distance: Positive | None = None
     view_height: Positive | None = None
 
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
-
 
 @dataclass(frozen=True, kw_only=True)
-class Animation:
+class Animation(Validated):
     """Animation of the camera. fps: frames per second. keyframes: at least two, ascending, frame 0 at the first.
 
     turntable_seconds: replaces keyframes; the camera goes once around its `look_at` point, about its `up`, seen from
@@ -50,9 +47,6 @@ class Animation:
     fps: Positive = 24.0
     turntable_seconds: float | None = None
     keyframes: tuple[Keyframe, ...] = ()
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
 
     @property
     def seconds(self) -> float:

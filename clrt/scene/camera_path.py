@@ -10,11 +10,11 @@ import numpy as np
 
 from ..errors import SceneError, UsageError
 from .animation import Animation, Keyframe, ModelAnimation, SceneAnimation
+from .fields.field_types import field_problems
 from .model import Camera, Scene
 from .model_pose import posed
 from .sky.sky import moving_sky, with_sky
 from .splines import Doubles, smooth
-from .validation.field_types import field_problems
 
 #: Upper limit on the number of frames; more are assumed to be a typing error.
 MOST_FRAMES = 1_000_000
@@ -116,7 +116,21 @@ def animation_problems(camera: Camera, animation: Animation) -> list[str]:
         for i in range(len(times) - 1)
         if times[i + 1] <= times[i]
     ]
-    return problems or _length_problems(animation) or _view_problems(camera, animation)
+    return (
+        problems
+        or _unread_problems(camera, animation)
+        or _length_problems(animation)
+        or _view_problems(camera, animation)
+    )
+
+
+def _unread_problems(camera: Camera, animation: Animation) -> list[str]:
+    """Return a problem for each field that keyframes set and the camera's projection does not read."""
+    return [
+        f'keyframe.{name}: has no effect with projection = "{camera.projection}"; leave it out'
+        for name in camera.unread_fields()
+        if any(getattr(key, name, None) is not None for key in animation.keyframes)
+    ]
 
 
 def _view_problems(camera: Camera, animation: Animation) -> list[str]:

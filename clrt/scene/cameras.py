@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import UsageError
 from .animation import Positive, Vector
 from .camera_matrices import Convention, coefficients_of, intrinsics_of, pose_of, world_to_camera_of
+from .fields.field_types import show
 from .fields.limits import Gt, Lt
-from .fields.tuples import tuples_for_lists
+from .fields.validated import Validated
 from .lens_model import BROWN_CONRADY, FISHEYE, LensModel
 from .materials.textures import NonNegative
 
@@ -26,7 +27,7 @@ Projection = Literal["perspective", "orthographic", "equirectangular", "fisheye"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Camera:
+class Camera(Validated):
     """Camera. `look_at` is at the image center; the image's right is cross(forward, up).
 
     projection:
@@ -122,8 +123,27 @@ class Camera:
         """The pose as a matrix (4, 4), in OpenCV's convention: x right, y down, z ahead."""
         return world_to_camera_of(self.position, self.look_at, self.up)
 
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
+    def conflicts(self) -> list[str]:
+        """Also returns what is wrong with the camera's frame."""
+        forward, up = np.subtract(self.look_at, self.position), np.array(self.up, np.float64)
+        if not forward.any():
+            return [f"look_at: {show(self.look_at)} is the camera's own position; move one of them"]
+        if not up.any():
+            return ["up: [0, 0, 0] is not a direction; write one, such as [0, 1, 0]"]
+        right = np.cross(forward / np.abs(forward).max(), up / np.abs(up).max())
+        if np.linalg.norm(right) < 1e-6:
+            return [f"up: {show(self.up)} is parallel to the view direction; write another, such as [0, 0, -1]"]
+        if (counts := CALIBRATED.get(self.projection)) and len(self.distortion) not in (0, *counts):
+            order = "k1, k2, p1, p2, k3, k4, k5, k6" if max(counts) == 8 else "k1, k2, k3, k4"
+            return [
+                f"distortion: {show(self.distortion)} has {len(self.distortion)} entries; write "
+                f'{" or ".join(map(str, counts))} with projection = "{self.projection}": {order}'
+            ]
+        return [
+            f'{name}: {show(getattr(self, name))} has no effect with projection = "{self.projection}"; leave it out'
+            for name, default in self.unread_fields().items()
+            if getattr(self, name) != default
+        ]
 
     @property
     def type(self) -> type[CameraType]:

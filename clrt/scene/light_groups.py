@@ -2,27 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 from ..errors import SceneError
 from .materials.material import Material
 from .model import Scene
-from .validation.field_types import show
 
 #: The group of all emitters without a name of a group, and of what is behind the scene and on catchers.
 DEFAULT = "default"
-#: Layer names in files are built from a group's name, with dots between their parts.
-NAME = re.compile(r"[A-Za-z0-9_-]+")
 #: Maximum number of groups: each takes 24 bytes per pixel of a film, and registers of a kernel.
 MOST_GROUPS = 16
-
-
-def name_problems(name: str, where: str) -> list[str]:
-    """Return a problem unless a group may have this name; an empty one means none."""
-    if not name or NAME.fullmatch(name):
-        return []
-    return [f"{where}: {show(name)} has other characters than letters, digits, - and _; leave them out"]
 
 
 def group_of(name: str) -> str:

@@ -8,11 +8,13 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from .fields.pixels import pixel_faults
+from .fields.validated import Validated
 from .materials.textures import Pair, Wrap, picture_matrix
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LightImage:
+class LightImage(Validated):
     """Image of a light, and its mapping to directions.
 
     pixels: (h, w, 3) float32, linear Rec. 709, row 0 on top; they multiply the light's intensity. `scale`,
@@ -27,6 +29,9 @@ class LightImage:
     rotation_degrees: float = 0.0
     wrap: tuple[Wrap, Wrap] | None = None
     filter: Literal["linear", "nearest"] = "linear"
+
+    def conflicts(self) -> list[str]:
+        return pixel_faults("pixels", self.pixels)
 
     @property
     def _mapping(self) -> tuple[Any, ...]:

@@ -17,8 +17,9 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from .fields.group_name import GroupName
 from .fields.limits import Ge, Gt, Le, Lt
-from .fields.tuples import tuples_for_lists
+from .fields.validated import Validated
 from .light_images import WHITE_IMAGE, LightImage
 from .materials.material import Radiance
 
@@ -70,16 +71,13 @@ class DistantBounds(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BaseLight(ABC):
+class BaseLight(Validated, ABC):
     """Base class of lights. kernel: its type in scene files; distant: whether it is infinitely far away. light_group:
     the name of the layer that its light is stored in (docs/light-groups.md), "" for the rest."""
 
     kernel: ClassVar[str]
     distant: ClassVar[bool] = False
-    light_group: str = ""
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
+    light_group: GroupName = ""
 
     @classmethod
     def kernels(cls) -> tuple[str, ...]:
@@ -104,7 +102,6 @@ class BaseLight(ABC):
         return frozenset()
 
     def conflicts(self) -> list[str]:
-        """Return what is wrong with its fields beyond their types: "FIELD: fault; remedy"."""
         if not any(getattr(self, "direction", (1,))):
             return ["direction: [0, 0, 0] is not a direction; write the one the light travels in"]
         if self.shows is None or upright(self.direction, self.up):  # type: ignore[attr-defined]

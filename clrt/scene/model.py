@@ -15,9 +15,14 @@ from ..errors import ClrtError
 from .animation import Animation, ModelAnimation, SceneAnimation
 from .axes_and_units import Axis, LightUnit, Unit
 from .cameras import Camera as Camera
+from .fields.field_types import show
+from .fields.group_name import GroupName
 from .fields.limits import Gt
 from .fields.number_arrays import real_array, whole_array
-from .fields.tuples import tuples_for_lists
+from .fields.pixels import image_faults
+from .fields.validated import Editable, Validated
+from .geometry.mesh_faults import CORNERS, mesh_faults
+from .geometry.transform_faults import placement_faults
 from .lights import Light
 from .materials.material_types import Diffuse, Material
 from .materials.textures import NonNegative
@@ -30,7 +35,7 @@ Positive = Annotated[float, Gt(0)]
 
 
 @dataclass(eq=False)
-class Mesh:
+class Mesh(Editable):
     """Triangle mesh with one material.
 
     - vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front. Lists and arrays of other
@@ -41,6 +46,10 @@ class Mesh:
       component its opacity.
     - tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing.
     - material_name: the material's name in the model file.
+
+    The arrays are read-only views of those that are given, which are not copied unless they are converted: do not
+    change them any more. Raises SceneError for other shapes, indices out of range, values that are not finite, normals
+    of length 0, and textures in the material without texture coordinates.
     """
 
     vertices: FloatArray
@@ -55,13 +64,32 @@ class Mesh:
     material_name: str = ""
 
     def __post_init__(self) -> None:
-        """Convert lists and other dtypes to float32 and int32 if the values fit; `validate` reports invalid arrays."""
+        """Convert lists and other dtypes to float32 and int32 if the values fit."""
         with suppress(ClrtError), np.errstate(over="ignore", under="ignore"):
             self.vertices = real_array("vertices", self.vertices).astype(np.float32, copy=False)
         with suppress(ClrtError):
             faces = whole_array("faces", self.faces)
             narrow = faces.astype(np.int32, copy=False)
-            self.faces = narrow if np.array_equal(faces, narrow) else faces
+            self.faces = narrow if narrow is faces or np.array_equal(faces, narrow) else faces
+        super().__post_init__()
+
+    @property
+    def title(self) -> str:
+        return f"mesh {show(self.name)}"
+
+    def faults(self) -> list[str]:
+        corners = {name: array for name in CORNERS if (array := getattr(self, name)) is not None}
+        arrays = mesh_faults(self.vertices, self.faces, corners)
+        return [f": {fault}" for fault in arrays] + (super().faults() or self.missing_uv(self.material))
+
+    def missing_uv(self, material: Material) -> list[str]:
+        """Return problems of a material's textures for which the mesh has no texture coordinates."""
+        return [
+            f": its material reads the texture {show(texture.picture.name)} at uv{texture.uv_set or ''}, but the mesh "
+            "has none; add texture coordinates, or use another material"
+            for texture in material.textures()
+            if (self.uv1 if texture.uv_set else self.uv) is None
+        ]
 
     @property
     def has_alpha(self) -> bool:
@@ -70,11 +98,12 @@ class Mesh:
 
 
 @dataclass(eq=False)
-class Instance:
+class Instance(Editable):
     """An instance, which shares its mesh's memory. The mesh itself is rendered only if the scene's `meshes` contain it.
 
     to_world: (3, 4), or (4, 4) with the last row 0, 0, 0, 1: an affine matrix that acts on column vectors and takes the
-    mesh's points to the world; it may mirror, but must not be singular. material: replaces the mesh's own.
+    mesh's points to the world; it may mirror, but must not be singular. material: replaces the mesh's own. The matrix
+    is read-only, as the arrays of `Mesh`; raises SceneError likewise.
     """
 
     mesh: Mesh
@@ -83,11 +112,29 @@ class Instance:
     name: str = "instance"
 
     def __post_init__(self) -> None:
-        """Convert numbers to float64 and four rows to three; `validate` reports invalid ones."""
+        """Convert numbers to float64 and four rows to three."""
         with suppress(ValueError, TypeError, OverflowError):
             matrix = np.asarray(self.to_world, np.float64)
             affine = matrix.shape == (4, 4) and np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0))
             self.to_world = matrix[:3] if affine else matrix
+        super().__post_init__()
+
+    @property
+    def title(self) -> str:
+        return f"instance {show(self.name)}"
+
+    def faults(self) -> list[str]:
+        if faults := super().faults():
+            return faults
+        if np.shape(self.to_world) != (3, 4):
+            return [
+                f": to_world has shape {np.shape(self.to_world)}; write a numpy array of shape (3, 4), or (4, 4) with "
+                "the last row 0, 0, 0, 1"
+            ]
+        if faults := placement_faults(self.to_world, self.mesh.vertices):
+            matrix = show(tuple(tuple(row) for row in self.to_world.tolist()))
+            return [f": to_world {matrix} {fault}; repair it" for fault in faults]
+        return [] if self.material is None else self.mesh.missing_uv(self.material)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -119,7 +166,7 @@ class Model:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sphere:
+class Sphere(Validated):
     """Sphere seen from outside (or from inside, which is its back side)."""
 
     center: Vector = (0.0, 0.0, 0.0)
@@ -127,18 +174,16 @@ class Sphere:
     material: Material = field(default_factory=Diffuse)
     name: str = "sphere"
 
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
-
 
 @dataclass(eq=False, kw_only=True)
-class Environment:
+class Environment(Editable):
     """Environment light: a constant `color`, or an environment map, `image` (h, w, 3) float32, equirectangular.
 
     Direction to texel: u = atan2(x, −z)/2π mod 1, v = acos(y)/π, row 0 on top; `rotation_degrees` rotates the
     environment about +Y, counter-clockwise seen from above. Radiance = strength · (color or texel). camera_visible:
     whether the camera sees it and the discs of the suns behind the scene; if not, it sees black there. light_group: the
-    name of the layer that its light is stored in (docs/light-groups.md), "" for the rest.
+    name of the layer that its light is stored in (docs/light-groups.md), "" for the rest. The image is read-only, as the
+    arrays of `Mesh`.
     """
 
     color: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
@@ -146,11 +191,14 @@ class Environment:
     strength: NonNegative = 1.0
     rotation_degrees: float = 0.0
     camera_visible: bool = True
-    light_group: str = ""
+    light_group: GroupName = ""
+
+    def conflicts(self) -> list[str]:
+        return image_faults(self.image, self.color)
 
 
 @dataclass(eq=False, kw_only=True)
-class Backdrop:
+class Backdrop(Editable):
     """Backdrop, seen by the camera behind the scene instead of the environment; it emits no light.
 
     A constant `color`, or an `image` (h, w, 3) float32, linear Rec. 709, which fills the rendered image and is cropped
@@ -159,6 +207,9 @@ class Backdrop:
 
     color: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     image: FloatArray | None = None
+
+    def conflicts(self) -> list[str]:
+        return image_faults(self.image, self.color)
 
 
 @dataclass(eq=False)
@@ -204,6 +255,9 @@ class Scene:
     - animation: how the camera and models move.
     - materials: the scene file's named ones; meshes and spheres refer to these objects.
     - source: the files that its parts were read from, if any.
+
+    Raises SceneError with all problems of its parts, and of what does not go together. Its lists and fields may be
+    changed; a scene is validated again before it is rendered.
     """
 
     meshes: list[Mesh] = field(default_factory=list)
@@ -219,3 +273,8 @@ class Scene:
     materials: dict[str, Material] = field(default_factory=dict)
     source: Source | None = None
     backdrop: Backdrop | None = None
+
+    def __post_init__(self) -> None:
+        from .validation.validate import validate  # which knows all parts of a scene
+
+        validate(self)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from ..option_fields import option
 from .fields.limits import Ge, Le, Lt
-from .fields.tuples import tuples_for_lists
+from .fields.validated import Validated
 
 Pixels = Annotated[int, Ge(1), Le(65536)]
 Integrator = Literal["path", "direct", "local", "raster", "normals", "albedo", "depth"]
@@ -19,7 +19,7 @@ NonNegative = Annotated[float, Ge(0)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class RenderSettings:
+class RenderSettings(Validated):
     """Default render settings of a scene.
 
     - size: (width, height) in pixels
@@ -55,6 +55,3 @@ class RenderSettings:
     )
     transparent: bool = option(False, "Write an alpha channel, without environment and backdrop behind the scene.")
     transparent_glass: bool = option(False, "Let what is behind the scene show through smooth glass, unrefracted.")
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)

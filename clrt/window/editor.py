@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from math import tau
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from imgui_bundle import imgui
 
 from ..device.device_info import DeviceInfo
-from ..errors import ClrtError, UsageError
+from ..errors import ClrtError, ObjectError, UsageError
 from ..formats.load_scene import load
 from ..live.live import Live
 from ..live.picks import Thing
@@ -26,11 +26,13 @@ from ..scene.editing import materials_of, with_material
 from ..scene.materials.material import Material
 from ..scene.model import Camera, Instance, Scene, Source, Sphere
 from .camera_controls import CameraControls
+from .fields import edit_fields
 from .navigation import around, distance
 from .screenshot import screenshot
 from .tone_mapping import DisplaySettings, ToneMapper
 
 _log = logging.getLogger(__name__)
+Value = TypeVar("Value")
 #: Titles of panels.
 SPHERES, MATERIALS = "Spheres", "Materials"
 #: Change of a coordinate per pixel of dragging, relative to the camera's distance.
@@ -83,13 +85,27 @@ class Editor:
             self._materials = self.scene, materials_of(self.scene)
         return self._materials[1]
 
+    def edited(self, record: Value, without: Collection[str] = (), changed_copy: Callable[..., Any] = replace) -> Value:
+        """Show widgets for the fields of an object (see `edit_fields`); it stays as it is, with a message, if its new
+        values are invalid."""
+
+        def tried(record: Value, **changed: Any) -> Value:
+            try:
+                made: Value = changed_copy(record, **changed)
+                return made
+            except ObjectError as problem:
+                self.message = str(problem)
+                return record
+
+        return edit_fields(record, self.step, without, tried)
+
     def edit(self, **changes: Any) -> None:
         """Replace parts of the scene. A drag is a single undo step."""
-        self._show(replace(self.scene, **changes))
+        self._show(lambda: replace(self.scene, **changes))
 
     def repaint(self, old: Material, new: Material) -> None:
         """Replace a material everywhere."""
-        self._show(with_material(self.scene, old, new))
+        self._show(lambda: with_material(self.scene, old, new))
 
     def walk(self, camera: Camera) -> None:
         """Move the camera, which is not an undo step."""
@@ -187,7 +203,7 @@ class Editor:
         self.frames += 1
         self.tone_mapper.ask(self.snapshot, self.look)
         if self._dragging and not imgui.is_any_item_active():
-            self._show(self.scene)
+            self._show(lambda: self.scene)
         self._choose_picked()
         self._move_light()
         if not imgui.get_io().want_text_input:
@@ -199,9 +215,9 @@ class Editor:
         if imgui.is_key_chord_pressed(imgui.Key.mod_ctrl | imgui.Key.y):
             self.live.redo()
 
-    def _show(self, scene: Scene) -> None:
+    def _show(self, edited: Callable[[], Scene]) -> None:
         self._dragging = imgui.is_any_item_active()
-        self.attempt(lambda: self.live.edit(scene, moving=self._dragging))
+        self.attempt(lambda: self.live.edit(edited(), moving=self._dragging))
 
     def _move_light(self) -> None:
         lights = list(self.scene.lights)

@@ -55,8 +55,13 @@ class NumberLimits(NamedTuple):
         return min(max(value, self.least), self.most)
 
 
-def edit_fields(record: Value, step: float, without: Collection[str] = ()) -> Value:
-    """Show widgets for all fields of a dataclass but some. step: change of a coordinate per pixel of dragging."""
+def edit_fields(
+    record: Value, step: float, without: Collection[str] = (), changed_copy: Callable[..., Any] = replace
+) -> Value:
+    """Show widgets for all fields of a dataclass but some. step: change of a coordinate per pixel of dragging.
+
+    changed_copy: called with the record and its changed fields, as dataclasses.replace, returns the new one.
+    """
     hints = get_type_hints(type(record), include_extras=True)
     changed = {}
     for field in fields(record):  # type: ignore[arg-type]
@@ -65,7 +70,7 @@ def edit_fields(record: Value, step: float, without: Collection[str] = ()) -> Va
             new = edit(field.name, hints[field.name], value, step)
             if new is not value:
                 changed[field.name] = new
-    return replace(record, **changed) if changed else record  # type: ignore[type-var]
+    return changed_copy(record, **changed) if changed else record
 
 
 def edit(label: str, hint: Any, value: Any, step: float) -> Any:

@@ -6,6 +6,7 @@ from math import floor
 
 from imgui_bundle import ImVec2, hello_imgui, imgui
 
+from ..errors import ObjectError
 from .editor import Editor
 from .tone_mapping import ToneMapped
 
@@ -36,7 +37,11 @@ class Viewport:
         if self._texture is not None:
             end = self.corner[0] + self.size[0], self.corner[1] + self.size[1]
             imgui.get_window_draw_list().add_image(imgui.ImTextureRef(self._texture.texture_id()), self.corner, end)
-        camera = editor.controls.move(editor.scene.camera, self.size[1])
+        try:
+            camera = editor.controls.move(editor.scene.camera, self.size[1])
+        except ObjectError as problem:  # it would look along its up vector, or stand at the look-at point
+            editor.message = str(problem)
+            return
         if camera is not editor.scene.camera:
             editor.walk(camera)
 

@@ -86,8 +86,7 @@ def test_an_image_that_is_repeated_in_different_sizes(folder: Path, caplog: pyte
     flat = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), uv=np.zeros((3, 2), np.float32))
     found = sizes_over(flat, Texture(picture=WHITE))
     assert not found.even and found.texels is None
-    flat.uv = np.array([[0, 0], [0.7, 0.1], [0.7, 0.1]], np.float32)
-    flat.uv[2, 0] += np.float32(1e-7)
+    flat.uv = np.array([[0, 0], [0.7, 0.1], [np.float32(0.7) + np.float32(1e-7), 0.1]], np.float32)
     assert np.isfinite(sizes_over(flat, Texture(picture=WHITE)).median).all()
     waves(folder)
     bump = BUMP.format(scale=0.1, to_uv='<scale value="3"/>')

@@ -115,7 +115,7 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
             '[materials.a]\ntype = "diffuse"\ncolor = { image = ["a.png"] }',
             'color.image: ["a.png"] is not a string; write',
         ),
-        ('[materials.a]\ntype = "diffuse"\nnormal_map = 3', "normal_map: 3 is not a texture; write { image = "),
+        ('[materials.a]\ntype = "diffuse"\nnormal_map = 3', "normal_map: 3 is not of type Texture; write { image = "),
         (
             '[materials.a]\ntype = "diffuse"\ncolor = "red"',
             'materials.a.color: "red" is not a list; write the numbers in',
@@ -249,7 +249,7 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
         ),
         (
             '[materials.m]\ntype = "diffuse"\nemission = [1, 1, 1]\ncatcher = true\n[[sphere]]\nmaterial = "m"',
-            "sphere[0].material.catcher: a catcher shows light that it receives, and this one emits",
+            "materials.m.catcher: a catcher shows light that it receives, and this one emits",
         ),
         ("[camera\nposition = 3", "is not valid TOML: "),
         (f"[camera]\nposition = [1{'0' * 5000}, 0, 0]", "is not valid TOML: "),

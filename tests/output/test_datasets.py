@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -157,7 +156,7 @@ def test_what_a_format_lacks_is_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="instance_id"):
         clrt.save_views(tmp_path, SCENE, [View(view.camera, {"rgb": view.layers["rgb"]})], "coco")
     with pytest.raises(UsageError, match="view 0 has projection 'orthographic'"):
-        clrt.save_views(tmp_path, SCENE, [View(replace(view.camera, projection="orthographic"), view.layers)])
+        clrt.save_views(tmp_path, SCENE, [View(clrt.Camera(projection="orthographic"), view.layers)])
 
 
 def test_colors_have_their_alpha(tmp_path: Path) -> None:

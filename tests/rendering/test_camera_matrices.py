@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from clrt.device.open import Device
 from clrt.errors import SceneError, UsageError
 from clrt.rendering.compile.camera_kernel import launch_record
-from clrt.rendering.compile.choices import Choices
-from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, RenderSettings, Scene, Sphere
 
@@ -128,6 +126,5 @@ def test_wrong_matrices(changes: dict[str, Any], message: str) -> None:
 
 @pytest.mark.parametrize("given", [{"lens_shift": (0.1, 0.0)}, {"skew": 0.1}])
 def test_the_rasterizer_needs_a_centered_lens(given: dict[str, Any]) -> None:
-    scene = Scene(spheres=[Sphere()], camera=Camera(**given), render=RenderSettings(integrator="raster"))
     with pytest.raises(SceneError, match=f"supports only pinhole cameras, and the camera has {next(iter(given))} = "):
-        compile_scene(scene, Choices())
+        Scene(spheres=[Sphere()], camera=Camera(**given), render=RenderSettings(integrator="raster"))

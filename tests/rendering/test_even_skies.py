@@ -27,10 +27,11 @@ def sky(brightness: Callable[[Doubles], Doubles]) -> Environment:
 
 def day(sun: float) -> Environment:
     """Grey over darker ground, and a sun of 9 texels, 0.013 sr: `sun` of 20 adds 7 % to all light."""
-    environment = sky(lambda w: np.where(w[:, 1] > 0, 0.5, 0.12))
-    assert environment.image is not None
-    environment.image[12:15, 90:93] = sun
-    return environment
+    plain = sky(lambda w: np.where(w[:, 1] > 0, 0.5, 0.12)).image
+    assert plain is not None
+    image = plain.copy()
+    image[12:15, 90:93] = sun
+    return Environment(image=image)
 
 
 @pytest.mark.parametrize("strength", [1e-30, 1.0, 1e30])

@@ -85,8 +85,9 @@ def test_a_cutoff_makes_it_all_or_nothing(device: Device, cutoff: float | None, 
 
 def test_a_picture_cuts_holes(device: Device) -> None:
     """A texture's alpha channel with holes, and vertex colours with an alpha gradient."""
-    holes = Picture(np.zeros((4, 4, 4), np.uint8))
-    holes.texels[..., 3] = np.random.default_rng(1).integers(0, 2, (4, 4)) * 255
+    texels = np.zeros((4, 4, 4), np.uint8)
+    texels[..., 3] = np.random.default_rng(1).integers(0, 2, (4, 4)) * 255
+    holes = Picture(texels)
     opacity = Texture(picture=holes, channel="alpha", filter="nearest")
     found = seen(device, quad(replace(lamp(1, 0, 0), opacity=opacity), 0.01), quad(lamp(0, 1, 0)))
     solid = np.kron(holes.texels[..., 3] > 0, np.ones((4, 4)))

@@ -125,8 +125,9 @@ def test_pictures_are_moved_scaled_and_turned(device: Device, degrees: float, or
 @pytest.mark.programs
 def test_second_set_of_coordinates_and_numbers(device: Device) -> None:
     """One material with a color from the first UV set and a metallic texture from the second."""
-    color, metal = picture(8, 4, 4), Picture(np.zeros((1, 2, 4), np.uint8))
-    metal.texels[0, 1, 2] = 255
+    texels = np.zeros((1, 2, 4), np.uint8)
+    texels[0, 1, 2] = 255
+    color, metal = picture(8, 4, 4), Picture(texels)
     material = MetallicRoughness(
         color=Texture(picture=color, filter="nearest"),
         roughness=1.0,
@@ -253,8 +254,9 @@ def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: Lanes, cu
 
     The reference is rendered with one SIMD width, as its result does not depend on it.
     """
-    half = Picture(np.full((1, 2, 4), 255, np.uint8))
-    half.texels[0, 0, :3] = 0
+    texels = np.full((1, 2, 4), 255, np.uint8)
+    texels[0, 0, :3] = 0
+    half = Picture(texels)
     above = (QUAD * (1, 1, 0) + (0, 1, 1))[:, [0, 2, 1]]
     ground = Mesh((QUAD * 9)[:, [0, 2, 1]].astype(np.float32), FACES[:, ::-1].copy(), Diffuse(color=(0.8, 0.8, 0.8)))
     glow = (5.0, 5.0, 5.0)

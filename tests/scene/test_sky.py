@@ -256,12 +256,12 @@ def test_time_zones_are_offsets() -> None:
 @pytest.mark.parametrize(
     ("values", "sentence"),
     [
-        ({}, "sky: has no sun; write time, latitude and longitude, or sun_direction"),
-        ({"latitude": 3}, "sky: time and longitude are missing; add what is"),
-        ({"sun_direction": (0, 1, 0), "latitude": 0}, "sky: has both a sun_direction and latitude; keep one of them"),
+        ({}, "Sky: has no sun; write time, latitude and longitude, or sun_direction"),
+        ({"latitude": 3}, "Sky: time and longitude are missing; add what is"),
+        ({"sun_direction": (0, 1, 0), "latitude": 0}, "Sky: has both a sun_direction and latitude; keep one of them"),
         ({"sun_direction": (0, 1, 0), "rotation_degrees": 3}, "both a sun_direction and rotation_degrees; keep one"),
         ({"sun_direction": (0, 1, 0), "hours_per_second": 3}, "both a sun_direction and hours_per_second; keep one"),
-        ({"sun_direction": (0, 0, 0)}, "sky.sun_direction: [0, 0, 0] is not a direction; write the one towards"),
+        ({"sun_direction": (0, 0, 0)}, "Sky.sun_direction: [0, 0, 0] is not a direction; write the one towards"),
         (
             {"sun_direction": (3, -4, 0)},
             "[3, -4, 0] is 53.1 degrees below the horizon, where the model ends; write one above",
@@ -269,21 +269,21 @@ def test_time_zones_are_offsets() -> None:
         ({"time": datetime(2026, 6, 21, 12), "latitude": 1, "longitude": 2}, "12:00:00 has no offset from UTC; write"),
         (
             {"time": datetime(2026, 6, 21, tzinfo=UTC), "latitude": 50, "longitude": 0},
-            "sky.time: at 2026-06-21T00:00:00+00:00 the sun is",
+            "Sky.time: at 2026-06-21T00:00:00+00:00 the sun is",
         ),
-        ({"time": "noon", "latitude": 50, "longitude": 0}, 'sky.time: "noon" is not a date and time; write one'),
-        ({"sun_direction": (0, 1, 0), "turbidity": 0.5}, "sky.turbidity: 0.5 is below 1; write at least 1"),
-        ({"sun_direction": (0, 1, 0), "turbidity": 11}, "sky.turbidity: 11 is above 10; write at most 10"),
-        ({"sun_direction": (0, 1, 0), "albedo": (0, 0, 1.5)}, "sky.albedo[2]: 1.5 is above 1; write at most 1"),
-        ({"sun_direction": (0, 1, 0), "sky_strength": -1}, "sky.sky_strength: -1 is below 0; write at least 0"),
-        ({"sun_direction": (0, float("nan"), 0)}, "sky.sun_direction[1]: nan is not a finite number; write one"),
+        ({"time": "noon", "latitude": 50, "longitude": 0}, 'Sky.time: "noon" is not a date and time; write one'),
+        ({"sun_direction": (0, 1, 0), "turbidity": 0.5}, "Sky.turbidity: 0.5 is below 1; write at least 1"),
+        ({"sun_direction": (0, 1, 0), "turbidity": 11}, "Sky.turbidity: 11 is above 10; write at most 10"),
+        ({"sun_direction": (0, 1, 0), "albedo": (0, 0, 1.5)}, "Sky.albedo[2]: 1.5 is above 1; write at most 1"),
+        ({"sun_direction": (0, 1, 0), "sky_strength": -1}, "Sky.sky_strength: -1 is below 0; write at least 0"),
+        ({"sun_direction": (0, float("nan"), 0)}, "Sky.sun_direction[1]: nan is not a finite number; write one"),
     ],
 )
 def test_mistakes(values: dict[str, Any], sentence: str) -> None:
     with pytest.raises(SceneError) as caught:
         clrt.Sky(**values)
     (problem,) = caught.value.problems
-    assert sentence in problem and problem.startswith("sky")
+    assert sentence in problem and problem.startswith("Sky")
 
 
 def test_the_sun_moves_in_frames() -> None:
@@ -312,7 +312,7 @@ def test_frames_at_night_are_refused_before_the_first() -> None:
     sky = Sky(time=datetime(2026, 6, 21, 12, tzinfo=UTC), latitude=50, longitude=5, hours_per_second=2.0)
     scene = clrt.turntable(Scene(environment=sky.environment(), lights=sky.lights()), 24, fps=4.0)
     with pytest.raises(
-        SceneError, match="sky.time: at 2026-06-21T20:00:00.00:00 the sun is .* degrees below the horizon"
+        SceneError, match="Sky.time: at 2026-06-21T20:00:00.00:00 the sun is .* degrees below the horizon"
     ):
         clrt.frames(scene)
     assert next(clrt.frames(scene, range(15)))[0] == 0

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ...scene.geometry.mesh_faults import index_problems
 from ...scene.geometry.normals import Normals, choose_normals
 from ...scene.model import Mesh
-from ...scene.validation.validate import index_problems
 from . import schema as gltf
 from .accessors import GltfData
 from .draco import decompress

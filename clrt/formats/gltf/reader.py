@@ -22,7 +22,6 @@ from ...scene.geometry.normals import Normals
 from ...scene.geometry.transform import Matrix, translation
 from ...scene.model import Mesh, Model
 from ...scene.model_pose import own_materials
-from ...scene.validation.validate import mesh_problems
 from ..far_origin import far_center
 from ..frame_model import bounds
 from ..model_choice import DEFAULT, ModelChoice, chosen
@@ -132,9 +131,6 @@ class GltfFile:
         places = list(self._places(graph, document))
         meshes, instances = shown(places)
         every = [*meshes, *meshes_by_id(instances).values()]
-        problems = [problem for mesh in every for problem in mesh_problems(mesh, "mesh")]
-        if problems:
-            raise SceneError(problems)
         if every:
             self._box = np.stack(bounds(meshes, instances))
         elif self._box is None:

@@ -229,7 +229,7 @@ def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attribute
         own, flat = (mesh, {}), flat or flat_itself
     for mesh, attributes in [own] if own else [(mesh, {}) for mesh in _in_file(path)]:
         if mesh.uv is not None and downward != (own is None):
-            mesh.uv[:, 1] = 1 - mesh.uv[:, 1]
+            mesh.uv = np.column_stack([mesh.uv[:, 0], 1 - mesh.uv[:, 1]])
         mesh.colors, mesh.tangents = None, None
         if flat:
             mesh.normals = None

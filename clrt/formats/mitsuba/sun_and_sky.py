@@ -9,7 +9,7 @@ from math import asin, cos, degrees, radians, sin
 
 import numpy as np
 
-from ...errors import SceneError
+from ...errors import ObjectError, SceneError
 from ...scene.geometry.transform import unit
 from ...scene.lights import DirectionalLight, Light
 from ...scene.model import Environment
@@ -56,8 +56,8 @@ def sun_and_sky(plugin: Plugin, notes: Notes) -> tuple[Environment | None, list[
             sun_strength=strength * plugin.value("sun_scale", float, 1.0) * (plugin.kind != "sky"),
             sun_angle_degrees=size,
         )
-    except SceneError as error:
-        raise SceneError([f"{plugin.at}: {problem}" for problem in error.problems]) from None
+    except ObjectError as error:
+        raise SceneError(error.named(f"{plugin.at}: sky")) from None
     if upright:
         return None if plugin.kind == "sun" else sky.environment(), sky.lights()
     x, y, z = (-towards).tolist()

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import SceneError
+from ...scene.geometry.mesh_faults import index_problems
 from ...scene.model import FloatArray, Mesh
-from ...scene.validation.validate import index_problems
 from .attributes import columns_of, coordinates_of
 from .elements import Columns, read_elements
 from .triangles import Triangles, faces_of

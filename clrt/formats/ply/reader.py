@@ -11,9 +11,9 @@ import numpy as np
 
 from ...errors import SceneError
 from ...file_names import printable
+from ...scene.geometry.mesh_faults import index_problems
 from ...scene.materials.material_types import Diffuse
 from ...scene.materials.textures import Picture, Texture
-from ...scene.validation.validate import index_problems
 from ..images.image_reader import read_texels
 from ..referenced_files import find_file, name_of
 from ..seams import with_corner_attributes

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...file_names import printable
 from ...scene.editing import free_name
-from ...scene.validation.validate import index_problems
+from ...scene.geometry.mesh_faults import index_problems
 from ..archives import check_archive
 from ..decoder import decode
 from ..seams import with_corner_attributes

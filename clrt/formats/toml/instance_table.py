@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ...scene.fields.field_types import show, unknown
 from ...scene.fields.limits import Ge, Le
 from ...scene.geometry.transform import (
     Matrix,
     transform_camera,
-    transform_faults,
     transform_light,
     transform_mesh,
     translation,
 )
+from ...scene.geometry.transform_faults import transform_faults
 from ...scene.materials.material_types import Material
 from ...scene.model import Instance, Model
-from ...scene.validation.field_types import show, unknown
 from .placement import Transform
 
 #: Maximum number of instances per table.
@@ -40,7 +40,7 @@ class Repeat(Transform):
 class InstanceTable(Transform):
     """Keys of [[instance]]; the entries of its `repeat` are read separately."""
 
-    mesh: str
+    mesh: Any  # a string; its problem lists the known names
     name: str | None = None
     material: str | None = None
     repeat: Any = ()

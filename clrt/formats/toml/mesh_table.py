@@ -10,8 +10,9 @@ from typing import Annotated
 
 import numpy as np
 
-from ...errors import SceneError
+from ...errors import ObjectError, SceneError
 from ...scene.axes_and_units import CONVERTED, Axis, LightUnit, Unit
+from ...scene.fields.field_types import show
 from ...scene.fields.limits import Ge, Le, Lt
 from ...scene.geometry.creases import creased
 from ...scene.geometry.instancing import meshes_by_id
@@ -21,7 +22,6 @@ from ...scene.materials.material_types import Diffuse
 from ...scene.model import Instance, Mesh, Model, Vector
 from ...scene.model_pose import with_poses
 from ...scene.provenance import parts_of
-from ...scene.validation.validate import mesh_problems
 from ..model_choice import DEFAULT, ModelChoice
 from ..models import read_model
 from ..up_axis import upright
@@ -117,10 +117,11 @@ class MeshTable(Transform):
             vertices = np.array(self.vertices, np.float32).reshape(-1, 3)
         faces = np.array(self.faces, np.int32).reshape(-1, 3)
         uv = None if self.uv is None else np.array(self.uv, np.float32).reshape(-1, 2)
-        mesh = Mesh(vertices, faces, Diffuse(), name=self.name or "mesh", uv=uv)
-        problems = mesh_problems(mesh, where)
-        if problems:
-            raise SceneError(problems)
+        name = self.name or "mesh"
+        try:
+            mesh = Mesh(vertices, faces, Diffuse(), name=name, uv=uv)
+        except ObjectError as error:
+            raise SceneError(error.named(f"{where} {show(name)}")) from None
         mesh.normals = choose_normals(self.normals, vertices, faces, None)
         return Model(meshes=[mesh])
 

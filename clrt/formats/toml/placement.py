@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ...errors import SceneError
+from ...scene.fields.field_types import show
 from ...scene.geometry.transform import Matrix, rotation, scaling, translation
 from ...scene.model import Vector
-from ...scene.validation.field_types import show
 
 Row = tuple[float, float, float, float]
 

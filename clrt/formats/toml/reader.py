@@ -8,9 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...errors import SceneError
+from ...errors import ObjectError, SceneError
 from ...scene.animation import Animation, Keyframe, SceneAnimation
 from ...scene.default_sky import SUN, default_sky
+from ...scene.fields.field_types import field_problems, show, unknown, usable
+from ...scene.fields.validated import read_only
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.lights import LIGHTS, Light
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
@@ -19,7 +21,6 @@ from ...scene.model import Backdrop, Camera, Environment, Instance, Model, Origi
 from ...scene.model_pose import with_poses
 from ...scene.provenance import material_of, parts_of
 from ...scene.sky.sky import Sky
-from ...scene.validation.field_types import field_problems, show, unknown, usable
 from ..images.image_reader import read_picture
 from ..referenced_files import name_of
 from .instance_table import InstanceReader, InstanceTable, Repeat, placed
@@ -87,21 +88,26 @@ class SceneReader:
         instances += [
             one for i, values in enumerate(self._tables("instance")) for one in self._instance(values, f"instance[{i}]")
         ]
-        return Scene(
-            meshes=meshes,
-            instances=instances,
-            lights=lights,
-            spheres=[each for each in spheres if each],
-            camera=self._named_camera(lens) if "name" in lens else camera,
-            cameras=self._cameras,
-            environment=environment or Environment(),
-            backdrop=backdrop,
-            render=render or RenderSettings(),
-            name=name_of(self._path),
-            animation=self._with_models(self._animation()),
-            materials=self._materials,
-            source=self._sources(),
+        camera = self._named_camera(lens) if "name" in lens else camera
+        animation, source = self._with_models(self._animation()), self._sources()
+        made = self._tried(
+            lambda: Scene(
+                meshes=meshes,
+                instances=instances,
+                lights=lights,
+                spheres=[each for each in spheres if each],
+                camera=camera,
+                cameras=self._cameras,
+                environment=environment or Environment(),
+                backdrop=backdrop,
+                render=render or RenderSettings(),
+                name=name_of(self._path),
+                animation=animation,
+                materials=self._materials,
+                source=source,
+            )
         )
+        return made or Scene(cameras=self._cameras)
 
     def _sources(self) -> Source:
         self._source.files += [
@@ -112,13 +118,16 @@ class SceneReader:
         return self._source
 
     def _camera(self, values: Any, where: str) -> Camera:
-        """Return the camera; if it is invalid, one with its position, look_at and up, so that these are checked."""
+        """Return the camera, or a default one if it is invalid; its position, look_at and up are always checked."""
         if not isinstance(values, dict):
             self.problems.append(f"{where}: {show(values)} is not a table; write its keys below [{where}]")
             return Camera()
-        camera = self._build(Camera, values, where)
+        if camera := self._build(Camera, values, where):
+            return camera
         place = {key: values[key] for key in ("position", "look_at", "up") if key in values}
-        return camera or (Camera() if field_problems(Camera, place, where) else Camera(**usable(Camera, place)))
+        if not field_problems(Camera, place, where):
+            self._made(lambda: Camera(**usable(Camera, place)), where)
+        return Camera()
 
     def _named_camera(self, values: Table) -> Camera:
         """Return the camera of `cameras` that the table names."""
@@ -174,7 +183,15 @@ class SceneReader:
         """Return kind(**values), or None if they are invalid."""
         problems = field_problems(kind, values, where)
         self.problems += problems
-        return None if problems else kind(**usable(kind, values))
+        return None if problems else self._made(lambda: kind(**usable(kind, values)), where)
+
+    def _made(self, make: Callable[[], Kind], where: str) -> Kind | None:
+        """Return make(), or None if it raises ObjectError, whose problems are collected as those of the table."""
+        try:
+            return make()
+        except ObjectError as error:
+            self.problems += [problem for problem in error.named(where) if problem not in self.problems]
+            return None
 
     def _typed(self, kinds: Sequence[type[Kind]], values: Any, where: str) -> Kind | None:
         """Return a material or light of the class whose `kernel` is the table's `type`."""
@@ -191,10 +208,7 @@ class SceneReader:
                 key: self._texture(value, f"{where}.{key}") if isinstance(value, dict) else value
                 for key, value in rest.items()
             }
-            made = self._build(known[str(values["type"])], rest, where)
-            conflicts = made.conflicts() if isinstance(made, Material) else []
-            self.problems += [f"{where}.{conflict}" for conflict in conflicts]
-            return None if conflicts else made
+            return self._build(known[str(values["type"])], rest, where)
         return None
 
     def _light(self, values: Any, where: str) -> Light | None:
@@ -220,7 +234,7 @@ class SceneReader:
                 if key in values
             ]
         image = self._picture(values, "environment") if "image" in values else image
-        return self._build(Environment, {**values, "image": image}, "environment")
+        return self._build(Environment, _one_kind(values, image), "environment")
 
     def _sky(self) -> Sky | None:
         """Return the analytic sky; None if there is none or if it is invalid."""
@@ -231,13 +245,11 @@ class SceneReader:
         values = self._table("sky")
         if values is not self._document["sky"]:
             return None
-        problems = field_problems(Sky, values, "sky")
-        self.problems += problems
-        return None if problems else self._tried(lambda: Sky(**usable(Sky, values)))
+        return self._build(Sky, values, "sky")
 
     def _backdrop(self, values: Table) -> Backdrop | None:
         image = self._picture(values, "backdrop") if "image" in values else None
-        return self._build(Backdrop, {**values, "image": image}, "backdrop")
+        return self._build(Backdrop, _one_kind(values, image), "backdrop")
 
     def _picture(self, values: Table, where: str) -> Any:
         """Return the image of a table without a color; None if it cannot be read."""
@@ -248,7 +260,7 @@ class SceneReader:
             self.problems.append(f"{where}.image: {show(name)} is not a string; write a file name in quotes")
             return None
         try:
-            image = read_picture(self._path.parent / name)
+            image = read_only(read_picture(self._path.parent / name))
         except SceneError as error:
             self.problems += [f"{where}.image: {problem}" for problem in error.problems]
             return None
@@ -292,7 +304,8 @@ class SceneReader:
             own = {mesh.material_name for mesh in (*model.meshes, *meshes_by_id(model.instances).values())}
             before = list(map(material_of, parts_of(model)))
             others = self._others(values, own, where)
-            model = with_poses(model, partial(placed, matrix=matrix, material=material, others=others))
+            place = partial(with_poses, model, partial(placed, matrix=matrix, material=material, others=others))
+            model = self._made(place, where) or Model(meshes=[])
             self._source.meshes.append(Origin(self._located(values), parts_of(model), before))
         for name, camera in model.cameras.items():
             self._source.cameras.setdefault(name, self._cameras.setdefault(name, camera))
@@ -342,7 +355,7 @@ class SceneReader:
         repeats = self._repeats(values.get("repeat", ()), f"{where}.repeat")
         copies = table and self._tried(self._instances.read, table, repeats, material, where)
         parts = self._instances.parts(table) if table and copies else []
-        made = copies.of(parts) if copies else []
+        made = (self._made(lambda: copies.of(parts), where) if copies else None) or []
         self._source.instances.append(Origin(values, made, [each.material for each in parts]))
         for name, moving in self._moving:
             if copies and name == str(values["mesh"]):
@@ -371,6 +384,13 @@ def camera_problems(name: str, cameras: Collection[str], where: str) -> list[str
         return []
     remedy = unknown(name, cameras) if cameras else "is unknown, as neither [cameras] nor a model file has one"
     return [f"{where}: {show(name)} {remedy}"]
+
+
+def _one_kind(values: Table, image: Any) -> Table:
+    """Return the table with its image instead of the file's name, if it could be read, or with its color."""
+    rest = {key: value for key, value in values.items() if key not in ("image", "color")}
+    color = {"color": values["color"]} if "color" in values and image is None else {}
+    return {**rest, **color, "image": image}
 
 
 def _one_scale(values: Table) -> Table:

@@ -11,10 +11,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SceneError
+from ...errors import ObjectError, SceneError
+from ...scene.fields.field_types import field_problems, show, usable
+from ...scene.fields.validated import read_only
 from ...scene.light_images import LightImage
 from ...scene.materials.textures import Channel, NonNegative, Pair, Picture, Texture, Wrap
-from ...scene.validation.field_types import field_problems, show, usable
 from ..images.image_reader import read_picture, read_texels
 
 
@@ -22,7 +23,7 @@ from ..images.image_reader import read_picture, read_texels
 class TextureTable:
     """Keys of a texture table, as in Texture; `wrap` may be one word for both directions, `scale` one number."""
 
-    image: str
+    image: Any  # a string; its problem says that it is the name of a file
     factor: NonNegative | tuple[NonNegative, NonNegative, NonNegative] = 1.0
     channel: Channel = "red"
     uv_set: int = 0
@@ -37,7 +38,7 @@ class TextureTable:
 class LightImageTable:
     """Keys of the table of a light's image, as in LightImage; `wrap` and `scale` as in TextureTable."""
 
-    image: str
+    image: Any  # a string; its problem says that it is the name of a file
     offset: Pair = (0.0, 0.0)
     scale: Pair = (1.0, 1.0)
     rotation_degrees: float = 0.0
@@ -69,8 +70,11 @@ class TextureReader:
         values, name = _checked(LightImageTable, values, where)
         if name not in self.pixels:
             with _blaming(where):
-                self.pixels[name] = read_picture(self._folder / name)
-        return LightImage(pixels=self.pixels[name], name=name, **usable(LightImageTable, values))
+                self.pixels[name] = read_only(read_picture(self._folder / name))
+        try:
+            return LightImage(pixels=self.pixels[name], name=name, **usable(LightImageTable, values))
+        except ObjectError as error:
+            raise SceneError(error.named(f"{where}.image")) from None
 
 
 def _checked(kind: type, values: Mapping[str, Any], where: str) -> tuple[dict[str, Any], str]:

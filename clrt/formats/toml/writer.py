@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...scene.animation import Animation, SceneAnimation
 from ...scene.default_sky import default_sky
 from ...scene.editing import free_name, materials_of
+from ...scene.fields.field_types import plain_value
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.light_images import LightImage
 from ...scene.materials.material import Material
@@ -27,7 +28,6 @@ from ...scene.materials.textures import Picture, Texture
 from ...scene.model import Backdrop, Environment, Instance, Mesh, Origin, Scene, Source
 from ...scene.provenance import material_of, shape_of
 from ...scene.sky.sky import Sky, SkyEnvironment
-from ...scene.validation.field_types import plain_value
 from ..gltf.glb_writer import mesh_glb
 from .texture_table import LightImageTable, TextureTable
 from .values import is_plain, toml_key, toml_value

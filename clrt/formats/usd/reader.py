@@ -21,11 +21,9 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...file_names import printable
 from ...scene.animation import ModelAnimation
-from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals
 from ...scene.geometry.transform import Matrix, scaling, translation
 from ...scene.model import Mesh, Model, Vector
-from ...scene.validation.validate import mesh_problems
 from ..archives import check_archive
 from ..decoder import decode
 from ..far_origin import far_center
@@ -96,11 +94,6 @@ def _posed(
     if any(center):
         to_scene = translation((-center[0], -center[1], -center[2])) @ to_scene
         meshes, instances = shown(_places(arrays, shapes, to_scene))
-    problems = [
-        problem for mesh in (*meshes, *meshes_by_id(instances).values()) for problem in mesh_problems(mesh, "mesh")
-    ]
-    if problems:
-        raise SceneError(problems)
     cameras, no_cameras = read_cameras(facts["cameras"], to_scene, np.stack(bounds(meshes, instances)).mean(axis=0))
     lights = read_lights(path, facts["lights"], materials, to_scene)
     counted = facts["ignored"] | shapes.ignored

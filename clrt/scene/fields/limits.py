@@ -1,4 +1,4 @@
-"""Bounds of numbers for the types of fields: `Annotated[float, Ge(0), Lt(90)]`.
+"""Limits of numbers and text for the types of fields: `Annotated[float, Ge(0), Lt(90)]`.
 
 The package annotated-types has the same, but takes longer to import than all materials of this project.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 
 class Limit:
-    """Base class of the limits. bound: the number to compare with."""
+    """Base class of the bounds. bound: the number to compare with."""
 
     def __init__(self, bound: float) -> None:
         self.bound = bound
@@ -27,3 +27,10 @@ class Le(Limit):
 
 class Lt(Limit):
     """Exclusive upper bound."""
+
+
+class Characters:
+    """The characters that text may have. pattern: regular expression of valid text; names: of its characters."""
+
+    def __init__(self, pattern: str, names: str) -> None:
+        self.pattern, self.names = pattern, names

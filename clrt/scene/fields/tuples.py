@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import fields
 from typing import Any
 
 
-def tuples_for_lists(record: Any) -> None:
-    """Convert a dataclass's lists and arrays of numbers to tuples, so that either may be given and it is hashable."""
+def tuples_for_lists(record: Any, without: Container[str] = ()) -> None:
+    """Convert a dataclass's lists and arrays of numbers to tuples, so that either may be given and it is hashable, and
+    numpy's numbers to Python's, so that none overflows.
+
+    without: names of fields that keep arrays.
+    """
     for field in fields(record):
-        value = getattr(record, field.name)
-        if hasattr(value, "tolist"):
-            value = value.tolist()
-        if isinstance(value, list):
-            object.__setattr__(record, field.name, tuple(value))
+        if field.name not in without and (plain := _plain(value := getattr(record, field.name))) is not value:
+            object.__setattr__(record, field.name, plain)
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "tolist"):  # arrays and numpy's numbers
+        value = value.tolist()
+    if isinstance(value, list):
+        return tuple(map(_plain, value))
+    if isinstance(value, tuple) and any(hasattr(entry, "tolist") for entry in value):
+        return tuple(map(_plain, value))
+    return value

@@ -13,8 +13,6 @@ from ..lights import Light
 from ..model import Camera, Mesh, Vector
 
 Matrix = NDArray[np.float64]
-#: A transform is singular if it scales volumes by less than this, relative to the cube of its longest column.
-SINGULAR = 1e-12
 
 
 def translation(offset: Vector) -> Matrix:
@@ -84,8 +82,8 @@ def transform_mesh(mesh: Mesh, matrix: Matrix) -> Mesh:
     """Return the mesh transformed by an affine `matrix`; computed in float64, stored in float32.
 
     Normals are transformed by the inverse transpose (its cofactors, which singular matrices have, too). A mirroring
-    matrix would turn the surface inside out, so the faces' winding is reversed. Values beyond float32's range become
-    Inf, which `validate` rejects.
+    matrix would turn the surface inside out, so the faces' winding is reversed. Raises SceneError for values beyond
+    float32's range.
     """
     if np.array_equal(matrix, np.eye(4)):
         return mesh
@@ -96,11 +94,12 @@ def transform_mesh(mesh: Mesh, matrix: Matrix) -> Mesh:
     normals = mesh.normals
     if normals is not None:
         cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1 if mirrored else 1)
-        normals = unit(normals @ cofactors.T).astype(np.float32)
+        turned = unit(normals @ cofactors.T).astype(np.float32)
+        normals = np.where(turned.any(axis=1, keepdims=True), turned, normals)  # a flat rim has none
     tangents = mesh.tangents
     if tangents is not None:
-        turned = unit(tangents[:, :3] @ linear.T)
-        tangents = np.column_stack([turned, -tangents[:, 3] if mirrored else tangents[:, 3]]).astype(np.float32)
+        along = unit(tangents[:, :3] @ linear.T)
+        tangents = np.column_stack([along, -tangents[:, 3] if mirrored else tangents[:, 3]]).astype(np.float32)
     faces = np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrored else mesh.faces
     return replace(mesh, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
 
@@ -126,15 +125,6 @@ def transform_light(light: Light, matrix: Matrix) -> Light:
         elif name == "image" and value is not None and mirrors:
             changed[name] = value.mirrored()
     return replace(light, **changed)
-
-
-def transform_faults(to_world: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:
-    """Return which affine transforms (k, 3, 4) cannot be inverted, (k,), by a description of the fault."""
-    with np.errstate(all="ignore"):
-        length = np.linalg.norm(to_world[..., :3], axis=1).max(axis=1, initial=0)
-        volume = np.abs(np.linalg.det(to_world[..., :3] / np.maximum(length, 1e-300)[:, None, None]))
-    finite = np.isfinite(to_world).all(axis=(1, 2))
-    return {"is not finite": ~finite, "flattens the mesh": finite & ~(volume > SINGULAR)}
 
 
 def unit(vectors: NDArray[np.floating]) -> NDArray[np.float64]:

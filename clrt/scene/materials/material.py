@@ -8,8 +8,9 @@ from functools import lru_cache
 from types import NoneType
 from typing import Annotated, Any, ClassVar, Self, get_args, get_origin, get_type_hints
 
+from ..fields.group_name import GroupName
 from ..fields.limits import Ge, Le
-from ..fields.tuples import tuples_for_lists
+from ..fields.validated import Validated
 from ..render_settings import Culling
 from .textures import NonNegative, Texture
 
@@ -25,7 +26,7 @@ MOST_IOR = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Material:
+class Material(Validated):
     """Base class of materials, with the fields that all have.
 
     - emission: radiance in W·sr⁻¹·m⁻² that its front side emits
@@ -51,10 +52,7 @@ class Material:
     double_sided: bool = False
     camera_visible: bool = True
     catcher: bool = False
-    light_group: str = ""
-
-    def __post_init__(self) -> None:
-        tuples_for_lists(self)
+    light_group: GroupName = ""
 
     def parameters(self) -> dict[str, Parameter]:
         """Return the values its kernel reads: numbers, triples, rows of a multiple of four, or textures in their place.
@@ -96,7 +94,10 @@ class Material:
         return as_color(self.emission.factor) if isinstance(self.emission, Texture) else self.emission
 
     def conflicts(self) -> list[str]:
-        """Return what is wrong with its combination of fields: "FIELD: fault; remedy"."""
+        if self.catcher and any(self.radiance):
+            return ["catcher: a catcher shows light that it receives, and this one emits; leave out one of them"]
+        if self.catcher and not self.camera_visible:
+            return ["catcher: a catcher must be seen by the camera; leave out camera_visible = false"]
         return []
 
     def without_textures(self: Self) -> Self:

@@ -78,10 +78,11 @@ class Conductor(Material):
         return frozenset(name for name, present in has.items() if present)
 
     def conflicts(self) -> list[str]:
-        if (self.eta is None) == (self.k is None):
-            return []
-        given, other = ("k", "eta") if self.eta is None else ("eta", "k")
-        return [f"{given}: is given without {other}; write both, or a preset alone"]
+        faults = super().conflicts()
+        if (self.eta is None) != (self.k is None):
+            given, other = ("k", "eta") if self.eta is None else ("eta", "k")
+            faults.append(f"{given}: is given without {other}; write both, or a preset alone")
+        return faults
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,7 +165,7 @@ class Dielectric(Material):
 
     def conflicts(self) -> list[str]:
         fault = "attenuation_distance: a thin surface has no interior; leave it out, or remove thin"
-        faults = [fault] if self.thin and self.attenuation_distance is not None else []
+        faults = super().conflicts() + [fault] * (self.thin and self.attenuation_distance is not None)
         if self.dispersion and (self.rough or self.thin):
             faults.append("dispersion: is for solid glass with roughness = 0; write dispersion = 0")
         if self.dispersion and self.reflectance != WHITE:

@@ -181,7 +181,8 @@ class MetallicRoughness(Material):
 
     def conflicts(self) -> list[str]:
         fault = 'anisotropy: is for smith = "height_correlated"; leave smith out, or write anisotropy = 0'
-        faults = [fault] if self.anisotropy != 0 and self.smith != "height_correlated" else []
+        faults = super().conflicts()
+        faults += [fault] if self.anisotropy != 0 and self.smith != "height_correlated" else []
         coupled = [name for name in ("iridescence", "diffuse_transmission") if getattr(self, name) != 0]
         if self.coupled_by != "albedo":
             faults += [f'{name}: is for coupling = "albedo"; write that, or {name} = 0' for name in coupled]

@@ -6,12 +6,13 @@ Coordinates are glTF's: (0, 0) is the upper left corner of the image, (1, 1) the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, ClassVar, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..fields.limits import Ge, Lt
+from ..fields.validated import Validated
 
 Channel = Literal["red", "green", "blue", "alpha"]
 Wrap = Literal["repeat", "mirror", "clamp"]
@@ -21,18 +22,26 @@ Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class Picture(Validated):
     """Image of a texture. texels: (h, w, 4) uint8, row 0 on top, unassociated alpha. Textures may share one."""
 
     texels: NDArray[np.uint8]
     name: str = "picture"
+
+    def conflicts(self) -> list[str]:
+        if not isinstance(self.texels, np.ndarray) or self.texels.dtype != np.uint8:
+            kind = self.texels.dtype if isinstance(self.texels, np.ndarray) else type(self.texels).__name__
+            return [f"texels: is {kind}; write a numpy array of uint8"]
+        if self.texels.ndim != 3 or self.texels.shape[2] != 4 or 0 in self.texels.shape:
+            return [f"texels: has shape {self.texels.shape}; it must be (height, width, 4) with at least one texel"]
+        return []
 
 
 WHITE = Picture(np.full((1, 1, 4), 255, np.uint8), "white")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Texture:
+class Texture(Validated):
     """Texture: an image, and its mapping to a surface.
 
     Colors are decoded from sRGB, numbers are linear and read from one `channel`; `factor`, one number or three,
@@ -40,6 +49,7 @@ class Texture:
     upright image), and translated by `offset`, as in KHR_texture_transform. filter: bilinear, or the nearest texel.
     """
 
+    remedy: ClassVar[str] = 'write { image = "FILE" }'
     picture: Picture
     factor: NonNegative | tuple[NonNegative, NonNegative, NonNegative] = 1.0
     channel: Channel = "red"

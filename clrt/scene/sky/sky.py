@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta, timezone
 from math import asin, atan2, cos, degrees, pi, radians, sin
 from typing import Annotated
 
 import numpy as np
 
-from ...errors import SceneError
+from ...errors import ObjectError, SceneError
+from ..fields.field_types import show
+from ..fields.group_name import GroupName
 from ..fields.limits import Ge, Le
-from ..fields.tuples import tuples_for_lists
+from ..fields.validated import Validated
 from ..geometry.transform import unit
-from ..light_groups import name_problems
 from ..lights import DirectionalLight, Light
 from ..materials.textures import NonNegative
 from ..model import Environment, Scene, Vector
-from ..validation.field_types import field_problems, show
 from .hosek_wilkie import SUN_DEGREES, sun_irradiance
 from .sky_image import horizontal_irradiance, sky_image
 from .sun_position import SunPosition, sun_position
@@ -31,7 +31,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sky:
+class Sky(Validated):
     """A clear sky and its sun, by Hosek and Wilkie (2012, 2013): an environment map and a directional light.
 
         sky = clrt.Sky(time=datetime.fromisoformat("2026-06-21T17:00+02:00"), latitude=52.5, longitude=13.4)
@@ -65,24 +65,22 @@ class Sky:
     sun_strength: NonNegative = 1.0
     sun_angle_degrees: Annotated[float, Ge(0), Le(90)] = SUN_DEGREES
     hours_per_second: float = 0.0
-    light_group: str = ""
-    sun_light_group: str = ""
+    light_group: GroupName = ""
+    sun_light_group: GroupName = ""
 
     def __post_init__(self) -> None:
-        tuples_for_lists(self)
-        problems = field_problems(Sky, {each.name: getattr(self, each.name) for each in fields(self)}, "sky")
-        if problems := problems or list(self._conflicts()):
-            raise SceneError(problems)
+        super().__post_init__()
         if self.time is not None:  # without the time zone's name, which is not data
             offset = timezone(self.time.utcoffset() or timedelta())
             object.__setattr__(self, "time", self.time.replace(tzinfo=offset))
         if self.position.elevation < 0:
             below = f"is {-self.position.elevation:.3g} degrees below the horizon, where the model ends; write one"
-            raise SceneError(
-                f"sky.sun_direction: {show(self.sun_direction)} {below} above it"
+            fault = (
+                f".sun_direction: {show(self.sun_direction)} {below} above it"
                 if self.time is None
-                else f"sky.time: at {show(self.time)} the sun {below} when it is up"
+                else f".time: at {show(self.time)} the sun {below} when it is up"
             )
+            raise ObjectError(self.title, [fault])
 
     @property
     def position(self) -> SunPosition:
@@ -138,22 +136,23 @@ class Sky:
         red, green, blue = (self.sun_strength * sun_irradiance(self.position.elevation, self.turbidity)).tolist()
         return red, green, blue
 
-    def _conflicts(self) -> Iterator[str]:
+    def faults(self) -> list[str]:
+        return super().faults() or list(self._place_faults())
+
+    def _place_faults(self) -> Iterator[str]:
         given = [name for name in PLACE if getattr(self, name) is not None]
         if self.sun_direction is None:
             missing = [name for name in PLACE if name not in given]
             if not given:
-                yield "sky: has no sun; write time, latitude and longitude, or sun_direction"
+                yield ": has no sun; write time, latitude and longitude, or sun_direction"
             elif missing:
-                yield f"sky: {' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing; add what is"
+                yield f": {' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing; add what is"
         elif also := [name for name in OF_PLACE if getattr(self, name) != getattr(Sky, name)]:
-            yield f"sky: has both a sun_direction and {also[0]}; keep one of them"
+            yield f": has both a sun_direction and {also[0]}; keep one of them"
         elif not any(self.sun_direction):
-            yield "sky.sun_direction: [0, 0, 0] is not a direction; write the one towards the sun"
-        for name in ("light_group", "sun_light_group"):
-            yield from name_problems(getattr(self, name), f"sky.{name}")
+            yield ".sun_direction: [0, 0, 0] is not a direction; write the one towards the sun"
         if self.time is not None and self.time.utcoffset() is None:
-            yield f"sky.time: {show(self.time)} has no offset from UTC; write one, such as {show(self.time)}+02:00"
+            yield f".time: {show(self.time)} has no offset from UTC; write one, such as {show(self.time)}+02:00"
 
 
 @dataclass(eq=False, kw_only=True)

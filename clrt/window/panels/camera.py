@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from ..editor import Editor
-from ..fields import choose, edit_fields
+from ..fields import choose
 
 ABOUT = """In the image: W A S D to walk, Q and E to move down and up, Shift to move faster.
 Drag with the left button to look around or orbit, with the middle button to pan.
@@ -28,7 +28,7 @@ class CameraPanel:
         )
         imgui.set_item_tooltip("Walking speed per second, relative to the distance to the look-at point.")
         imgui.push_id("camera")
-        new = edit_fields(camera, editor.step)
+        new = editor.edited(camera)
         imgui.pop_id()
         if new is not camera:
             editor.edit(camera=new)

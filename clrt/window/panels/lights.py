@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import imgui
 
+from ...scene.fields.field_types import FLOAT32_MAX
 from ...scene.lights import LIGHTS, Light, fields_of
 from ...scene.model import Camera, Environment
 from ..editor import ROUND, Editor
-from ..fields import edit_fields
 from ..lists import change, pick
 from ..navigation import distance
 
@@ -37,13 +37,13 @@ class Lights:
             editor.edit(lights=lights)
         imgui.separator_text("Environment")
         imgui.push_id("environment")
-        environment = _edited_sky(editor.scene.environment, editor.step)
+        environment = _edited_sky(editor)
         imgui.pop_id()
         if environment is not editor.scene.environment:
             editor.edit(environment=environment)
 
     def _edited(self, editor: Editor, light: Light) -> Light:
-        light = edit_fields(light, editor.step)
+        light = editor.edited(light)
         if light.distant:
             return light
         changed, moves = imgui.checkbox("moves", editor.moving_light == self.chosen)
@@ -63,14 +63,14 @@ def _new(camera: Camera) -> dict[str, Light]:
         "direction": down,
         "up": np.subtract(camera.look_at, camera.position).tolist(),
         "irradiance": (BRIGHT,) * 3,
-        "intensity": (BRIGHT * far**2,) * 3,
+        "intensity": (min(BRIGHT * far**2, FLOAT32_MAX),) * 3,
         "radius": far / SMALL,
         "radiance": (BRIGHT * SMALL**2 / np.pi,) * 3,
     }
     return {kind.kernel: kind(**fields_of(kind, values)) for kind in LIGHTS}
 
 
-def _edited_sky(environment: Environment, step: float) -> Environment:
+def _edited_sky(editor: Editor) -> Environment:
     """Show widgets for the environment; its color is hidden if it has an image, as it has no effect."""
-    without = {"image", "sky"} | ({"color"} if environment.image is not None else set())
-    return edit_fields(environment, step, without)
+    environment = editor.scene.environment
+    return editor.edited(environment, {"image", "sky"} | ({"color"} if environment.image is not None else set()))

@@ -12,7 +12,7 @@ from ...live.settings import Settings
 from ...output.view_transform import VIEWS
 from ...scene.fields.limits import Ge, Le
 from ..editor import Editor
-from ..fields import choose, edit, edit_fields
+from ..fields import choose, edit
 from ..tone_mapping import DisplaySettings
 
 #: Settings with a fixed set of values, by name; None selects automatically by device and scene.
@@ -34,7 +34,7 @@ NUMBERS: dict[str, Any] = {
 def show(editor: Editor) -> None:
     """Draw the panel."""
     imgui.push_id("render")
-    render = edit_fields(editor.scene.render, editor.step)
+    render = editor.edited(editor.scene.render)
     if render is not editor.scene.render:
         editor.edit(render=render)
     imgui.separator_text("Tracing")

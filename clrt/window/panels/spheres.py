@@ -10,7 +10,7 @@ from ...scene.editing import free_name
 from ...scene.materials.material_types import Diffuse, Material
 from ...scene.model import Sphere
 from ..editor import Editor
-from ..fields import choose, edit_fields
+from ..fields import choose
 from ..lists import change, pick
 from ..navigation import distance
 
@@ -38,7 +38,7 @@ def show(editor: Editor) -> None:
 
 def _edited(editor: Editor, sphere: Sphere) -> tuple[Sphere, dict[str, Material]]:
     """Return the edited sphere, and the scene's named materials, to which a new one may have been added."""
-    sphere = edit_fields(sphere, editor.step, without={"material"})
+    sphere = editor.edited(sphere, without={"material"})
     materials, named = editor.materials, editor.scene.materials
     name = next(name for name, material in materials.items() if material is sphere.material)
     chosen = choose("material", list(materials), name)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import operator
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from datetime import date, datetime, time
@@ -14,15 +15,10 @@ from functools import lru_cache, reduce
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-import numpy as np
+from .limits import Characters, Ge, Gt, Le, Limit, Lt
 
-from ..fields.limits import Ge, Gt, Le, Limit, Lt
-from ..materials.textures import Texture
-
-#: Fields whose values are not plain data; the code that uses them validates them.
-ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "pixels", "to_world"})
 INT64_END = 2**63
-FLOAT32_MAX = float(np.finfo(np.float32).max)
+FLOAT32_MAX = (2 - 2**-23) * 2.0**127
 #: More problems than this in one object are counted, not listed.
 MOST = 12
 
@@ -32,10 +28,11 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
     "where.field: value ...".
 
     Finds missing and unknown fields, wrong types, values outside the limits of the type, and numbers that float32
-    cannot represent (NaN, Inf and out of range). Numbers may be numpy scalars; sequences must be tuples.
+    cannot represent (NaN, Inf and out of range). Numbers may be numpy scalars; sequences must be tuples. Arrays and
+    mappings are not checked.
     """
     plain = {name: plain_value(value) for name, value in values.items()}
-    hints = _hints(kind)
+    hints = field_types(kind)
     problems: list[str] = []
     for field in fields(kind):
         if field.name in plain:
@@ -56,7 +53,7 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
 def usable(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
     """Return valid `values` for the fields of `kind` in a form that numpy can use: integers of more than 64 bits, for
     which it has no type, become floats if the field accepts these."""
-    hints = _hints(kind)
+    hints = field_types(kind)
     return {name: _floats(hints[name], value) for name, value in values.items()}
 
 
@@ -89,11 +86,37 @@ def show(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def field_types(kind: type) -> dict[str, Any]:
+    """Return the types of a dataclass's fields by name, with their limits; Any for arrays and mappings."""
+    return _field_types(kind)
+
+
+def array_fields(kind: type) -> frozenset[str]:
+    """Return the names of a dataclass's fields that are arrays, or None."""
+    return _array_fields(kind)
+
+
 @lru_cache
-def _hints(kind: type) -> dict[str, Any]:
-    """Return the types of a dataclass's fields, with their limits."""
+def _field_types(kind: type) -> dict[str, Any]:
     hints = get_type_hints(kind, include_extras=True)
-    return {field.name: Any if field.name in ELSEWHERE else hints[field.name] for field in fields(kind)}
+    return {field.name: Any if _is_opaque(hints[field.name]) else hints[field.name] for field in fields(kind)}
+
+
+@lru_cache
+def _array_fields(kind: type) -> frozenset[str]:
+    hints = get_type_hints(kind)
+    return frozenset(field.name for field in fields(kind) if "ndarray" in _origins(hints[field.name]))
+
+
+def _is_opaque(hint: Any) -> bool:
+    """Return whether values of this type are not plain data."""
+    return not _origins(hint).isdisjoint({"ndarray", "Mapping", "dict"})
+
+
+def _origins(hint: Any) -> set[str]:
+    """Return the names of a type's generic origins, by which arrays are found without importing numpy."""
+    parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    return {getattr(get_origin(part), "__name__", "") for part in parts}
 
 
 def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
@@ -105,17 +128,13 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
         rest = tuple(part for part in parts if part is not NoneType)
         yield from () if value is None else _problems(reduce(operator.or_, rest), value, path)
     elif origin in (Union, UnionType):
-        yield from _problems(_meant(parts, value), value, path)
-        if isinstance(value, Texture):
-            yield from _problems(_factor(parts[0], value), value.factor, f"{path}.factor")
-    elif hint is Texture and not isinstance(value, Texture):
-        yield f'{path}: {show(value)} is not a texture; write {{ image = "FILE" }}'
+        meant = _meant(parts, value)
+        yield from _problems(meant, value, path)
+        if is_dataclass(meant) and hasattr(value, "factor"):  # a texture's, instead of a plain value
+            yield from _problems(_factor(parts[0], value.factor), value.factor, f"{path}.factor")
     elif isinstance(hint, type) and is_dataclass(hint):
-        yield from (
-            field_problems(hint, {field.name: getattr(value, field.name) for field in fields(hint)}, path)
-            if isinstance(value, hint)
-            else [f"{path}: {show(value)} is not of type {hint.__name__}; write one"]
-        )
+        if not isinstance(value, hint):
+            yield f"{path}: {show(value)} is not of type {hint.__name__}; {_example(hint)}"
     elif origin is Literal:
         if not (isinstance(value, str) and value in parts):
             yield f"{path}: {show(value)} {unknown(value, parts)}"
@@ -156,15 +175,26 @@ def _meant(parts: tuple[Any, ...], value: Any) -> Any:
     return next((part for kind, part in kinds if isinstance(kind, type) and isinstance(value, kind)), parts[0])
 
 
-def _factor(plain: Any, texture: Texture) -> Any:
+def _factor(plain: Any, factor: object) -> Any:
     """Return the type of a texture's factor, given the type of the plain value; a color also accepts one number."""
-    one = get_origin(plain) is tuple and not isinstance(texture.factor, tuple)
+    one = get_origin(plain) is tuple and not isinstance(factor, tuple)
     return get_args(plain)[0] if one else plain
 
 
-def _outside(limits: Iterable[Limit], value: float, path: str) -> Iterator[str]:
-    """Yield the limits that a number violates."""
+def _example(kind: type) -> str:
+    """Return how an object of this type is written, in the scene file and in Python."""
+    if "remedy" in vars(kind):
+        return str(vars(kind)["remedy"])
+    return f"write a clrt.{' or clrt.'.join(each.__name__ for each in kind.__subclasses__() or [kind])}"
+
+
+def _outside(limits: Iterable[Limit | Characters], value: Any, path: str) -> Iterator[str]:
+    """Yield the limits that a number or text violates."""
     for limit in limits:
+        if isinstance(limit, Characters):
+            if not re.fullmatch(limit.pattern, value):
+                yield f"{path}: {show(value)} has other characters than {limit.names}; leave them out"
+            continue
         keeps, is_wrong, remedy = _LIMITS[type(limit)]
         if not keeps(value, limit.bound):
             yield f"{path}: {show(value)} {is_wrong} {limit.bound}; {remedy} {limit.bound}"
@@ -175,7 +205,7 @@ def _fault(kind: Any, value: Any) -> str:
     if isinstance(value, _ACCEPTED[kind]) and isinstance(value, bool) == (kind is bool):
         finite = not isinstance(value, float) or math.isfinite(value)
         return "" if finite else "is not a finite number; write one"
-    if kind is tuple and isinstance(value, (list, np.ndarray)):
+    if kind is tuple and (isinstance(value, list) or hasattr(value, "tolist")):
         return f"is a {type(value).__name__}; write a tuple"
     return _REMEDIES[kind]
 
@@ -201,7 +231,7 @@ def plain_value(value: Any) -> Any:
     """Convert numpy scalars to Python's, also inside tuples."""
     if isinstance(value, tuple):
         return tuple(map(plain_value, value))
-    return value.item() if isinstance(value, np.generic) else value
+    return value.item() if getattr(value, "ndim", None) == 0 else value
 
 
 def _too_large(value: Any) -> bool:

@@ -1,0 +1,92 @@
+"""Base classes of the scene's dataclasses, which are valid once they are made."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any, Self
+
+from ...errors import ObjectError
+from .field_types import array_fields, field_problems, field_types, unknown, usable
+from .tuples import tuples_for_lists
+
+
+class Validated:
+    """Base class of dataclasses whose fields are validated when an object is made, copied or unpickled.
+
+    Raises ObjectError, which names the class, the field, the value and the remedy, also for unknown keywords. Lists and
+    arrays of numbers become tuples. Fields that are arrays keep read-only views: they share the memory of the array
+    that was given, which stays writable for its owner, who must not change it any more.
+    """
+
+    def __new__(cls, *values: object, **named: object) -> Self:
+        known = field_types(cls)
+        if wrong := [name for name in named if name not in known]:
+            raise ObjectError(cls.__name__, [f': the field "{name}" {unknown(name, known)}' for name in wrong])
+        return super().__new__(cls)
+
+    def __post_init__(self) -> None:
+        arrays = array_fields(type(self))
+        for name in arrays:
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        tuples_for_lists(self, without=arrays)
+        self.check()
+        for name, value in usable(type(self), self._given()).items():
+            object.__setattr__(self, name, value)
+
+    def check(self) -> None:
+        """Raise ObjectError if a field is invalid."""
+        if faults := self.faults():
+            raise ObjectError(self.title, faults)
+
+    @property
+    def title(self) -> str:
+        """What its errors call it, if its place in a scene is not known."""
+        return type(self).__name__
+
+    def faults(self) -> list[str]:
+        """Return what is wrong with its fields: ".FIELD: value is wrong; remedy"."""
+        return field_problems(type(self), self._given(), "") or [f".{conflict}" for conflict in self.conflicts()]
+
+    def _given(self) -> dict[str, Any]:
+        """Return the fields that are not the defaults, which are valid."""
+        values = [(field, getattr(self, field.name)) for field in fields(self)]  # type: ignore[arg-type]
+        return {field.name: value for field, value in values if value is not field.default}
+
+    def conflicts(self) -> list[str]:
+        """Return what is wrong with fields whose types are right: "FIELD: fault; remedy"."""
+        return []
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore a copied or unpickled object, whose arrays are writable."""
+        vars(self).update(state)
+        vars(self).pop("_valid", None)
+        self.__post_init__()
+
+
+class Editable(Validated):
+    """Base class of dataclasses whose fields may be assigned. What is assigned is validated when the object becomes
+    part of a scene, and before a scene is rendered."""
+
+    _valid = False
+
+    def __setattr__(self, name: str, value: object) -> None:
+        arrays = array_fields(type(self))
+        object.__setattr__(self, name, read_only(value) if name in arrays else value)
+        vars(self).pop("_valid", None)
+
+    def check(self) -> None:
+        """Raise ObjectError if a field is invalid; does nothing if none was assigned since the last time."""
+        if not self._valid:
+            super().check()
+            vars(self)["_valid"] = True
+
+
+def read_only(value: Any) -> Any:
+    """Return a read-only view of an array; one that is read-only, and other values, as they are."""
+    import numpy as np  # not for render settings, from which the command line reads its options
+
+    if not isinstance(value, np.ndarray) or not value.flags.writeable:
+        return value
+    view = value.view(np.ndarray)
+    view.setflags(write=False)
+    return view

@@ -1,0 +1,130 @@
+"""Objects of a scene are valid once they are made, whatever they are made of, and their arrays are read-only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
+
+import clrt
+from clrt.errors import ClrtError, SceneError
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.lights import LIGHTS
+from clrt.scene.materials.material_types import MATERIALS
+from clrt.scene.model import Scene
+
+Vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+FACES = np.array([[0, 1, 2]], np.int32)
+UV = Vertices[:, :2].copy()
+PICTURE = clrt.Picture(np.full((2, 2, 4), 200, np.uint8))
+IMAGE = np.ones((2, 4, 3), np.float32)
+LIGHT_IMAGE = clrt.LightImage(pixels=IMAGE)
+#: Values of fields that have no default, by name.
+GIVEN: dict[str, Any] = {
+    "position": (0.0, 3.0, 0.0),
+    "direction": (0.0, -1.0, 0.1),
+    "intensity": (1.0, 1.0, 1.0),
+    "irradiance": (1.0, 1.0, 1.0),
+}
+
+
+def mesh(**values: Any) -> clrt.Mesh:
+    return clrt.Mesh(**{"vertices": Vertices, "faces": FACES, "uv": UV, "uv1": UV, "normals": Vertices + 1, **values})
+
+
+def light(kind: type) -> Callable[..., Any]:
+    known = {field.name for field in fields(kind)}
+    return lambda **values: kind(**{name: value for name, value in GIVEN.items() if name in known} | values)
+
+
+#: Public dataclass: how one is made, and a scene with one.
+MADE: dict[type, tuple[Callable[..., Any], Callable[[Any], Scene]]] = {
+    clrt.Mesh: (mesh, lambda made: Scene(meshes=[made])),
+    clrt.Instance: (lambda **values: clrt.Instance(**{"mesh": mesh(), **values}), lambda made: Scene(instances=[made])),
+    clrt.Sphere: (clrt.Sphere, lambda made: Scene(spheres=[made])),
+    clrt.Camera: (clrt.Camera, lambda made: Scene(camera=made)),
+    clrt.Environment: (clrt.Environment, lambda made: Scene(environment=made)),
+    clrt.Backdrop: (clrt.Backdrop, lambda made: Scene(backdrop=made)),
+    clrt.RenderSettings: (clrt.RenderSettings, lambda made: Scene(render=made)),
+    clrt.Picture: (
+        lambda **values: clrt.Picture(**{"texels": PICTURE.texels, **values}),
+        lambda made: Scene(meshes=[mesh(material=clrt.Diffuse(color=clrt.Texture(picture=made)))]),
+    ),
+    clrt.Texture: (
+        lambda **values: clrt.Texture(**{"picture": PICTURE, **values}),
+        lambda made: Scene(meshes=[mesh(material=clrt.Diffuse(color=made))]),
+    ),
+    clrt.LightImage: (
+        lambda **values: clrt.LightImage(**{"pixels": IMAGE, **values}),
+        lambda made: Scene(lights=[light(clrt.ProjectorLight)(image=made)]),
+    ),
+    clrt.Keyframe: (
+        lambda **values: clrt.Keyframe(**{"time": 1.0, **values}),
+        lambda made: Scene(animation=clrt.Animation(keyframes=(clrt.Keyframe(time=0.5), made))),
+    ),
+    clrt.Animation: (
+        lambda **values: clrt.Animation(**{"turntable_seconds": 1.0, **values}),
+        lambda made: Scene(animation=made),
+    ),
+    clrt.Sky: (
+        lambda **values: clrt.Sky(**{"sun_direction": (0.3, 0.8, 0.2), **values}),
+        lambda made: Scene(environment=made.environment(), lights=made.lights()),
+    ),
+    clrt.Scene: (clrt.Scene, lambda made: made),
+    **{
+        kind: (kind, lambda made: Scene(spheres=[clrt.Sphere(material=made)], meshes=[mesh(material=made)]))
+        for kind in MATERIALS
+    },
+    **{kind: (light(kind), lambda made: Scene(lights=[made])) for kind in LIGHTS},
+}
+FIELDS = [(kind, field.name) for kind in MADE for field in fields(kind)]
+
+NUMBERS = st.sampled_from([0, -1, 1, 0.5, 2, 3.7, -0.0, 1e-45, 1e39, 2**70, -(2**31)]) | st.floats() | st.integers()
+ARRAYS = st.builds(
+    lambda shape, dtype, value: np.full(shape, value).astype(dtype),
+    st.lists(st.integers(0, 4), max_size=4).map(tuple),
+    st.sampled_from(["f4", "f8", "i4", "i8", "u1", "?", "U3", "c8", "O"]),
+    st.sampled_from([0, 1, 2, 255]),
+)
+OBJECTS = st.sampled_from(
+    [mesh(), clrt.Sphere(), clrt.Diffuse(), clrt.Camera(), clrt.Texture(picture=PICTURE), PICTURE, LIGHT_IMAGE, Scene()]
+)
+PLAIN: SearchStrategy[Any] = (
+    NUMBERS
+    | st.text(max_size=5)
+    | st.sampled_from([None, True, False, object(), b"gold", "ggx", "gold", "path", "fisheye", "beckmann", "repeat"])
+    | NUMBERS.map(np.float32)
+)
+VALUES: SearchStrategy[Any] = (
+    PLAIN
+    | ARRAYS
+    | OBJECTS
+    | st.lists(PLAIN | OBJECTS | NUMBERS, max_size=4)
+    | st.lists(NUMBERS, min_size=2, max_size=3).map(tuple)
+    | st.lists(st.lists(NUMBERS, min_size=2, max_size=4), max_size=3)
+    | st.dictionaries(st.text(max_size=2), PLAIN | OBJECTS, max_size=2)
+)
+
+
+@pytest.mark.filterwarnings("ignore:overflow encountered in cast", "ignore:invalid value encountered in cast")
+@pytest.mark.parametrize(("kind", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part))
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(data=st.data())
+def test_what_can_be_made_can_be_rendered(kind: type, name: str, data: DataObject) -> None:
+    """Any value of any field is refused with one of clrt's errors when the object is made, or when it becomes part of
+    a scene; or else the scene is compiled without an error."""
+    make, scene_of = MADE[kind]
+    try:
+        scene = scene_of(make(**{name: data.draw(VALUES, label=name)}))
+    except ClrtError as refused:
+        assert isinstance(refused, SceneError) and ": " in str(refused)
+        return
+    if scene.animation is not None:
+        _, scene = next(clrt.frames(scene, [0]))
+    compile_scene(scene, Choices())
