@@ -122,7 +122,8 @@ _HOME = {
         "Phong",
         "Plastic",
     ),
-    "scene.model": ("Backdrop", "Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
+    "formats.trimesh_models": ("Scene",),  # which may contain meshes of trimesh
+    "scene.model": ("Backdrop", "Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Sphere"),
     "scene.stereo": ("stereo_pair",),
     "scene.view": ("View",),
     "scene.materials.textures": ("Picture", "Texture"),

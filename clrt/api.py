@@ -24,12 +24,14 @@ from .rendering.renderer_options import SETTINGS, RendererOptions
 from .rendering.stop_conditions import planned_spp
 from .scene.axes_and_units import Axis, LightUnit, Unit
 from .scene.camera_path import frames as _frames
+from .scene.fields.keywords import with_known_keywords
 from .scene.model import Scene
 
 #: A mesh or a scene of trimesh, which has no types.
 Trimesh = Any
 
 
+@with_known_keywords
 @with_default_errors
 def load(
     path: StrPath | Trimesh,

@@ -15,6 +15,8 @@ HOUSE = Path(__file__).parents[1]
 #: Page → number of its blocks, and files that they write.
 PAGES = {
     "rays": (4, ()),
+    "python": (6, ("ball.png", "denoised.png", "ball.toml", "red.png", "torus.png")),
+    "denoise": (1, ("smooth.exr",)),
     "transparent-background": (2, ("product.png", "product.exr")),
     "light-measurements": (2, ()),
     "bake": (3, ("light.exr", "light.png", "light.json", "occlusion.png", "table.exr")),

@@ -13,11 +13,12 @@ from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from ..output.images import write_image
 from ..output.report import header_of
+from ..scene.fields.validated import Validated
 
 
 @dataclass(frozen=True, eq=False)
-class LightMap:
-    """Baked image of a mesh.
+class LightMap(Validated):
+    """Baked image of a mesh. Its arrays are read-only: change a copy.
 
     - pixels: (height, width, 3) float32, linear; 0 where the mesh covers no texel, beyond the padding
     - standard_error: of the pixels, likewise

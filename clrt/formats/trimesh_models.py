@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from ..errors import SceneError
-from ..scene.model import Scene
+from ..scene.model import CONVERSIONS, Model, Scene as Scene
 
 
 def is_trimesh(model: object) -> bool:
@@ -19,10 +20,34 @@ def is_trimesh(model: object) -> bool:
 
 def scene_of(model: object, load: Callable[[Path], Scene]) -> Scene:
     """Return what `load` makes of a .glb file of the model. Raises SceneError if trimesh cannot write one."""
+    with _exported(model) as path:
+        return replace(load(path), source=None)
+
+
+def _model_of(model: object) -> Model | None:
+    """Return the content of a mesh or scene of trimesh; None for others."""
+    if not is_trimesh(model):
+        return None
+    from .models import read_model  # only such scenes need it
+
+    with _exported(model) as path:
+        return read_model(path)
+
+
+@contextmanager
+def _exported(model: object) -> Iterator[Path]:
+    """Yield the path of a .glb file of the model, which is removed afterwards, and is not named in errors."""
+    name = f"{type(model).__name__} of trimesh"
     with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
         path = Path(folder) / "trimesh.glb"
         try:
             path.write_bytes(model.export(file_type="glb"))  # type: ignore[attr-defined]
         except (AttributeError, TypeError, ValueError, KeyError, IndexError, ZeroDivisionError) as error:
-            raise SceneError(f"{type(model).__name__} of trimesh: cannot be exported as glTF ({error})") from error
-        return replace(load(path), source=None)
+            raise SceneError(f"{name}: cannot be exported as glTF ({error})") from error
+        try:
+            yield path
+        except SceneError as error:
+            raise SceneError([problem.replace(str(path), name) for problem in error.problems]) from None
+
+
+CONVERSIONS.append(_model_of)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DeviceError, UsageError
 from ..float_errors import with_default_errors
+from ..scene.fields.keywords import with_known_keywords
 from ..scene.fields.number_arrays import real_array
 from .data_images import check_denoisable
 from .image import Image
@@ -111,6 +112,7 @@ def denoise(image: Image, albedo: ArrayLike | None = None, normal: ArrayLike | N
 def denoise(image: ArrayLike, albedo: ArrayLike | None = None, normal: ArrayLike | None = None) -> FloatArray: ...
 
 
+@with_known_keywords
 @with_default_errors
 def denoise(
     image: Image | ArrayLike, albedo: ArrayLike | None = None, normal: ArrayLike | None = None

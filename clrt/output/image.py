@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from ..aov_types import OF_GROUP
 from ..file_names import StrPath
 from ..float_errors import with_default_errors
+from ..scene.fields.field_types import show
+from ..scene.fields.validated import Validated, read_only
 from .data_images import shown_data
 from .file_formats import is_shown
 from .images import write_image
@@ -20,8 +22,8 @@ from .report import header_of
 
 
 @dataclass(frozen=True)
-class Image:
-    """Rendered image.
+class Image(Validated):
+    """Rendered image. Its arrays are read-only: change a copy, such as `image.pixels.copy()`.
 
     - pixels: (height, width, 3) float32, linear Rec. 709
     - report: how it was rendered, as in docs/report.md
@@ -38,6 +40,20 @@ class Image:
     aovs: dict[str, NDArray[np.generic]] = field(default_factory=dict)
     alpha: NDArray[np.float32] | None = None
     backdrop: NDArray[np.float32] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "aovs", {name: read_only(array) for name, array in self.aovs.items()})
+
+    def conflicts(self) -> list[str]:
+        given = {name: getattr(self, name) for name in ("report", "aovs")}
+        faults = [
+            f"{name}: {show(value)} is not a dict" for name, value in given.items() if not isinstance(value, dict)
+        ]
+        form: Any = self.pixels
+        if not (isinstance(form, np.ndarray) and form.ndim == 3 and form.shape[2] == 3 and form.dtype.kind == "f"):
+            faults.append(f"pixels: {show(form)} is not an image; give an array (height, width, 3) of float32")
+        return faults
 
     @property
     def layers(self) -> NDArray[np.float32]:

@@ -13,6 +13,7 @@ from ..errors import SceneError, UsageError
 from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from ..formats.images.image_reader import read_layers
+from ..scene.fields.keywords import with_known_keywords
 from .image import Image
 
 FloatArray = NDArray[np.float32]
@@ -33,6 +34,7 @@ def compare_files(image: Path, reference: Path) -> dict[str, Any]:
     return _measures(ours[0], theirs[0], hdr) | _alpha_measure(ours[1], theirs[1])
 
 
+@with_known_keywords
 @with_default_errors
 def compare(image: AnyImage, reference: AnyImage, *, hdr: bool = True) -> dict[str, Any]:
     """Return how much an image x differs from a reference r, by several measures.

@@ -7,11 +7,13 @@ from pathlib import Path
 from ..errors import OutputError
 from ..file_names import StrPath
 from ..formats.toml.writer import scene_files
+from ..scene.fields.keywords import with_known_keywords
 from ..scene.model import Scene
 from .atomic_files import check_target, check_unprotected, replacing
 from .images import write_image, write_texels
 
 
+@with_known_keywords
 def save_scene(scene: Scene, path: StrPath, *, force: bool = True) -> list[Path]:
     """Write the files that the scene needs (scene.writing), then the scene file `path`; return all these paths.
 

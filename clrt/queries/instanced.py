@@ -14,6 +14,7 @@ from ..accel.two_level import TwoLevelBvh
 from ..device.open import open_device
 from ..errors import SceneError
 from ..float_errors import with_default_errors
+from ..scene.fields.keywords import with_known_keywords
 from ..scene.fields.number_arrays import real_array, whole_array
 from ..scene.geometry.mesh_arrays import mesh_arrays
 from ..scene.geometry.scaling import SceneFrame, frame_around, unit_for
@@ -38,6 +39,7 @@ class InstancedRayQuery(TreeQuery):
     UsageError for other choices.
     """
 
+    @with_known_keywords
     @with_default_errors
     def __init__(
         self,

@@ -14,6 +14,7 @@ from ..accel.refit import Refitter, can_refit
 from ..device.open import Device, open_device
 from ..errors import SceneError, UsageError
 from ..float_errors import with_default_errors
+from ..scene.fields.keywords import with_known_keywords
 from ..scene.geometry.mesh_arrays import finite_points, mesh_arrays, sphere_array
 from ..scene.geometry.ray_arrays import Rays
 from ..scene.geometry.scaling import SceneFrame, frame_around
@@ -23,7 +24,8 @@ from .base import TreeQuery
 class RayQuery(TreeQuery):
     """Triangles and spheres to intersect with rays; `TreeQuery`, the base class, describes rays and hits.
 
-    - vertices: (n, 3) float32, or float64 if far from the origin; faces: (m, 3) int32; or a `trimesh.Trimesh` alone
+    - vertices: (n, 3) float32, or float64 if far from the origin; faces: (m, 3) int32; or a mesh or scene of
+      trimesh alone
     - spheres: (s, 4) float32, center and radius, the primitives m … m + s − 1, with u = v = 0
 
     Choices that do not affect the results:
@@ -43,6 +45,7 @@ class RayQuery(TreeQuery):
     not above 0, and UsageError for other choices.
     """
 
+    @with_known_keywords
     @with_default_errors
     def __init__(
         self,
@@ -59,6 +62,8 @@ class RayQuery(TreeQuery):
         traversal: str | None = None,
     ) -> None:
         """Build the BVH; see the class."""
+        if faces is None and hasattr(vertices, "to_mesh"):  # a scene of trimesh
+            vertices = vertices.to_mesh()
         if faces is None and hasattr(vertices, "faces"):
             vertices, faces = vertices.vertices, vertices.faces  # type: ignore[union-attr]
         elif faces is None:

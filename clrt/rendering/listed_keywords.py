@@ -12,8 +12,7 @@ from textwrap import fill
 from types import NoneType
 from typing import Annotated, Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
 
-from ..errors import UsageError
-from ..scene.fields.field_types import unknown
+from ..scene.fields.keywords import check_keywords
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -67,9 +66,7 @@ def _checked(
 
     @wraps(call)
     def checked(*arguments: Any, **given: Any) -> Any:
-        for each in given:
-            if each not in known:
-                raise UsageError(f'{name}: the option "{each}" {unknown(each, known)}')
+        check_keywords(name, given, known)
         return call(*arguments, **given)
 
     setattr(checked, "__signature__", signature(call).replace(parameters=[*own, *keywords]))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 from ..accel.methods import BoxTest, BuilderName, HitTests, LayoutName, SphereTest, TriangleTest
 from ..device.device_info import Paths
 from ..device.open import Selectors
+from ..errors import ObjectError, SceneError
 from ..file_names import StrPath
 from ..scene.render_settings import Culling, Filter, Integrator, RenderSettings, Sampler
 from .aovs import chosen_aovs, needs_direct_light, needs_light_groups, seen_first
@@ -88,8 +89,12 @@ class RendererOptions(PictureOptions, TracingOptions, CheckpointOptions, total=F
 
 
 def settings_of(settings: RenderSettings, options: Mapping[str, object]) -> RenderSettings:
-    """Return a scene's settings, overridden by the given options; None means not given."""
-    return replace(settings, **_given(options, RenderSettings))
+    """Return a scene's settings, overridden by the given options; None means not given. Raises SceneError for invalid
+    ones."""
+    try:
+        return replace(settings, **_given(options, RenderSettings))
+    except ObjectError as error:
+        raise SceneError(error.named("render")) from None
 
 
 def choices_of(options: Mapping[str, object]) -> Choices:

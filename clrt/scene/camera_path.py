@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import SceneError, UsageError
 from .animation import Animation, Keyframe, ModelAnimation, SceneAnimation
 from .fields.field_types import field_problems
+from .fields.keywords import with_known_keywords
 from .model import Camera, Scene
 from .model_pose import posed
 from .sky.sky import moving_sky, with_sky
@@ -20,6 +21,7 @@ from .splines import Doubles, smooth
 MOST_FRAMES = 1_000_000
 
 
+@with_known_keywords
 def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
     """Return the scene with the camera going once around in this number of frames, while a scene file's models move.
 
@@ -35,6 +37,7 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
     return replace(scene, animation=around)
 
 
+@with_known_keywords
 def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
     """Return the number and the static scene of all frames, or of the `chosen` ones.
 

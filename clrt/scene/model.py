@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,7 +20,7 @@ from .fields.group_name import GroupName
 from .fields.limits import Gt
 from .fields.number_arrays import real_array, whole_array
 from .fields.pixels import image_faults
-from .fields.validated import Editable, Validated
+from .fields.validated import Editable, KnownFields, Validated
 from .geometry.mesh_faults import CORNERS, mesh_faults
 from .geometry.transform_faults import placement_faults
 from .lights import Light
@@ -246,9 +246,15 @@ class Source:
         return next((path for each, path in self.files if each is content), None)
 
 
+#: Conversions of other libraries' meshes and scenes, which return None for anything else (formats.trimesh_models).
+CONVERSIONS: list[Callable[[object], Model | None]] = []
+
+
 @dataclass(eq=False, kw_only=True)
-class Scene:
+class Scene(KnownFields):
     """Everything needed to render an image.
+
+    - meshes: also meshes and scenes of trimesh, which are converted, with the materials that they have in glTF.
 
     - camera: the one to render; cameras: others by name, including those of model files.
     - backdrop: what the camera sees behind the scene, if not the environment.
@@ -277,4 +283,16 @@ class Scene:
     def __post_init__(self) -> None:
         from .validation.validate import validate  # which knows all parts of a scene
 
+        if isinstance(self.meshes, list | tuple) and not all(isinstance(each, Mesh) for each in self.meshes):
+            self._convert()
         validate(self)
+
+    def _convert(self) -> None:
+        """Replace other libraries' meshes and scenes by what they show."""
+        models = [next(filter(None, (convert(each) for convert in CONVERSIONS)), None) for each in self.meshes]
+        self.meshes = [
+            mesh
+            for each, model in zip(self.meshes, models)
+            for mesh in ([each] if model is None else [*model.meshes, *model.emitters])
+        ]
+        self.instances = [*self.instances, *(each for model in models if model for each in model.instances)]

@@ -8,8 +8,10 @@ import numpy as np
 
 from ..errors import UsageError
 from .cameras import Camera
+from .fields.keywords import with_known_keywords
 
 
+@with_known_keywords
 def stereo_pair(
     camera: Camera, baseline: float, *, converge_at: float | None = None, size: tuple[int, int] = (1, 1)
 ) -> tuple[Camera, Camera]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,3 +69,26 @@ def test_what_has_no_triangles(empty: object) -> None:
 def test_faces_may_be_missing_only_of_meshes() -> None:
     with pytest.raises(UsageError, match="faces is missing"):
         clrt.RayQuery(np.zeros((3, 3)))
+
+
+def test_a_scene_is_made_of_meshes_and_scenes() -> None:
+    """They are what the same files show, among clrt's own meshes."""
+    own = clrt.Mesh(np.eye(3), [[0, 1, 2]])  # type: ignore[arg-type]
+    made = clrt.Scene(meshes=[own, scene(), trimesh.creation.box()], spheres=[clrt.Sphere()])  # type: ignore[list-item]
+    assert triangles(made) == 1 + 2 * 320 + 12 + 12 and made.meshes[0] is own
+    for one, other in zip(made.meshes[1:], clrt.load(scene()).meshes):
+        np.testing.assert_array_equal(one.vertices, other.vertices)
+        assert one.material == other.material
+    with pytest.raises(SceneError, match=r"meshes: <trimesh.* is not a list; write meshes=\[...\]"):
+        clrt.Scene(meshes=trimesh.creation.box())
+    with pytest.raises(SceneError, match="^Trimesh of trimesh: its scene contains no triangles"):
+        clrt.Scene(meshes=[trimesh.Trimesh()])  # type: ignore[list-item]
+
+
+def test_rays_meet_all_meshes_of_a_scene() -> None:
+    made = scene()
+    origins, down = np.array([[0, 0, 9], [3, 0, 9], [0, 0, 9], [8, 8, 9]], float), np.array([0, 0, -1.0])
+    given: Any = made
+    expected = clrt.RayQuery(made.to_mesh()).closest_hit(origins, down)
+    assert np.array_equal(clrt.RayQuery(given).closest_hit(origins, down), expected)
+    assert (expected["primitive"] >= 0).tolist() == [True, True, True, False]

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,6 +109,55 @@ def test_guides_guide(image: clrt.Image, guides: dict[str, Floats], converged: F
     assert image.raw is not None
     flat = {name: np.zeros_like(picture) for name, picture in guides.items()}
     assert image.report["denoise"]["relmse"] < 0.9 * relmse(Denoiser()(image.raw, **flat), converged)  # type: ignore
+
+
+def test_an_image_is_denoised_afterwards(image: clrt.Image, guides: dict[str, Floats]) -> None:
+    """By the guides of `denoise=True`, with the same result bit for bit; the rest of the image is kept."""
+    assert image.raw is not None
+    noisy = clrt.Image(image.raw, {"seed": 11}, aovs={**guides, "depth": image.raw[..., 0]})
+    smooth = clrt.denoise(noisy)
+    assert np.array_equal(smooth.pixels, image.pixels) and smooth.raw is noisy.pixels
+    assert smooth.report["seed"] == 11 and smooth.aovs.keys() == noisy.aovs.keys()
+    assert smooth.report["denoise"]["bias"] == image.report["denoise"]["bias"]
+    assert np.array_equal(clrt.denoise(image.raw, guides["albedo"], guides["normal"]), image.pixels)
+    assert np.array_equal(clrt.denoise(replace(noisy, aovs={}), **guides).pixels, image.pixels)
+
+
+def test_the_more_guides_the_smaller_the_error(image: clrt.Image, guides: dict[str, Floats], converged: Floats) -> None:
+    assert image.raw is not None
+    given: list[dict[str, Floats]] = [{}, {"albedo": guides["albedo"]}, guides]
+    raw, plain, colored, whole = (
+        relmse(pixels, converged) or 0.0 for pixels in (image.raw, *(clrt.denoise(image.raw, **each) for each in given))
+    )
+    assert 0 < whole < plain < raw / 2 and 0 < colored < plain
+
+
+def test_alpha_is_denoised_as_in_a_render() -> None:
+    """As the layers of a transparent image; an array has the layers' shape."""
+    options = {"size": (48, 32), "transparent": True, "seed": 3}
+    whole = clrt.render(scene(), spp=4, denoise=True, **options)  # type: ignore[arg-type]
+    plain = clrt.render(scene(), spp=4, **options)  # type: ignore[arg-type]
+    found = render_guides(clrt.Renderer(scene(), **options).session)  # type: ignore[arg-type]
+    assert np.array_equal(clrt.denoise(plain, **found).layers, whole.layers)
+    assert np.array_equal(clrt.denoise(plain.layers, **found), whole.layers)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"image": np.ones((4, 4))}, r"image \(4, 4\) must have the shape"),
+        ({"image": np.ones((0, 4, 3))}, r"image \(0, 4, 3\) must"),
+        ({"image": "a.exr"}, "image has dtype"),
+        ({"image": np.ones((4, 4, 3)), "albedo": np.ones((4, 5, 3))}, r"albedo \(4, 5, 3\) must .* \(4, 4, 3\)"),
+        ({"image": np.ones((4, 4, 3)), "normal": np.ones((4, 4, 3))}, "normal is given without albedo"),
+        ({"image": clrt.Image(np.ones((4, 4, 3), np.float32), {"integrator": "depth"})}, "the integrator is depth"),
+        ({"image": clrt.Image(np.ones((4, 4, 3), np.float32), raw=np.ones((4, 4, 3), np.float32))}, "denoised already"),
+    ],
+    ids=lambda each: each if isinstance(each, str) else "",
+)
+def test_what_cannot_be_denoised_is_named(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(clrt.UsageError, match=words):
+        clrt.denoise(**given)
 
 
 def test_what_is_not_finite_is_black(image: clrt.Image, guides: dict[str, Floats]) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,13 +17,14 @@ import clrt
 from clrt.errors import ClrtError, SceneError
 from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.fields.field_types import field_problems
 from clrt.scene.lights import LIGHTS
 from clrt.scene.materials.material_types import MATERIALS
 from clrt.scene.model import Scene
 
-Vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 FACES = np.array([[0, 1, 2]], np.int32)
-UV = Vertices[:, :2].copy()
+UV = VERTICES[:, :2].copy()
 PICTURE = clrt.Picture(np.full((2, 2, 4), 200, np.uint8))
 IMAGE = np.ones((2, 4, 3), np.float32)
 LIGHT_IMAGE = clrt.LightImage(pixels=IMAGE)
@@ -35,7 +38,7 @@ GIVEN: dict[str, Any] = {
 
 
 def mesh(**values: Any) -> clrt.Mesh:
-    return clrt.Mesh(**{"vertices": Vertices, "faces": FACES, "uv": UV, "uv1": UV, "normals": Vertices + 1, **values})
+    return clrt.Mesh(**{"vertices": VERTICES, "faces": FACES, "uv": UV, "uv1": UV, "normals": VERTICES + 1, **values})
 
 
 def light(kind: type) -> Callable[..., Any]:
@@ -128,3 +131,91 @@ def test_what_can_be_made_can_be_rendered(kind: type, name: str, data: DataObjec
     if scene.animation is not None:
         _, scene = next(clrt.frames(scene, [0]))
     compile_scene(scene, Choices())
+
+
+def arrays_of(value: Any) -> list[np.ndarray[Any, Any]]:
+    """Return the arrays that an object of a scene keeps, also within its parts."""
+    if isinstance(value, np.ndarray):
+        return [value]
+    if isinstance(value, dict):
+        return arrays_of(list(value.values()))
+    if isinstance(value, list | tuple):
+        return [array for each in value for array in arrays_of(each)]
+    if not hasattr(value, "__dataclass_fields__"):
+        return []
+    return arrays_of([getattr(value, field.name) for field in fields(value)])
+
+
+KEEPING: dict[str, Callable[[], Any]] = {
+    "mesh": lambda: mesh(colors=VERTICES, tangents=np.ones((3, 4), np.float32), uv1=UV),
+    "instance": lambda: clrt.Instance(mesh(), np.eye(4)),
+    "picture": lambda: clrt.Texture(picture=PICTURE),
+    "light": lambda: light(clrt.SpotLight)(image=LIGHT_IMAGE),
+    "environment": lambda: clrt.Environment(image=IMAGE),
+    "sky": lambda: clrt.Sky(sun_direction=(0, 1, 0)).environment(),
+    "backdrop": lambda: clrt.Backdrop(image=IMAGE),
+    "image": lambda: clrt.Image(IMAGE, {}, IMAGE, {"depth": IMAGE[..., 0]}, IMAGE[..., 0], IMAGE),
+    "light map": lambda: clrt.LightMap(IMAGE, IMAGE, IMAGE[..., 0] > 0, {}),
+    "scene": lambda: Scene(meshes=[mesh()], environment=clrt.Environment(image=IMAGE)),
+}
+COPIES: dict[str, Callable[[Any], Any]] = {
+    "itself": lambda made: made,
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda made: pickle.loads(pickle.dumps(made)),
+    "replace": replace,
+}
+
+
+@pytest.mark.parametrize("way", COPIES)
+@pytest.mark.parametrize("name", KEEPING)
+def test_arrays_are_read_only(name: str, way: str) -> None:
+    """Those of copies, too; the caller's own arrays stay writable."""
+    arrays = arrays_of(COPIES[way](KEEPING[name]()))
+    assert arrays
+    for array in arrays:
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+    assert all(each.flags.writeable for each in (VERTICES, FACES, UV, IMAGE))
+
+
+def test_arrays_are_not_copied() -> None:
+    """Of the right dtypes they share the caller's memory; meshes and images made of others' arrays keep these."""
+    made = mesh()
+    assert np.shares_memory(made.vertices, VERTICES) and np.shares_memory(made.faces, FACES)
+    again = replace(made, material=clrt.Mirror())
+    assert again.vertices is made.vertices and again.faces is made.faces
+    made.normals = VERTICES + 1
+    assert not made.normals.flags.writeable
+
+
+def test_the_caller_s_changed_arrays_are_validated_again() -> None:
+    """Only read-only arrays count as known to be valid."""
+    points = VERTICES.copy()
+    mesh(vertices=points)
+    points[1, 2] = np.nan
+    with pytest.raises(SceneError, match=r"vertices\[1\] = \[1.0, 0.0, nan\] is not finite"):
+        mesh(vertices=points)
+
+
+def test_defaults_are_valid() -> None:
+    """Fields at their defaults are not checked."""
+    for kind in MADE:
+        if kind is not Scene:
+            made = MADE[kind][0]()
+            values = {field.name: getattr(made, field.name) for field in fields(kind)}
+            assert field_problems(kind, values, "") == []
+
+
+def test_unknown_fields_are_named_with_the_closest_one() -> None:
+    for kind in MADE:
+        known = fields(kind)[-1].name
+        with pytest.raises(SceneError, match=f'^{kind.__name__}: the field "{known}x" is unknown; did you mean "'):
+            kind(**{f"{known}x": 1})
+
+
+def test_errors_are_pickled() -> None:
+    with pytest.raises(SceneError) as caught:
+        clrt.Sphere(radius=-1)
+    copied = pickle.loads(pickle.dumps(caught.value))
+    assert copied.problems == caught.value.problems and copied.named("sphere[3]")[0].startswith("sphere[3].radius: -1")

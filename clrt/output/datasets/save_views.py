@@ -9,6 +9,7 @@ from typing import Literal, Protocol, get_args
 from ...errors import UsageError, check_choice
 from ...file_names import StrPath
 from ...scene.cameras import CALIBRATED
+from ...scene.fields.keywords import with_known_keywords
 from ...scene.model import Scene
 from ...scene.numbered_objects import object_names
 from ...scene.view import View
@@ -38,6 +39,7 @@ WRITERS: dict[str, Callable[[Path, Scene], Writer]] = {
 }
 
 
+@with_known_keywords
 def save_views(
     folder: StrPath, scene: Scene, views: Iterable[View], formats: DatasetFormat | Iterable[DatasetFormat] = "nerf"
 ) -> Path:

@@ -10,19 +10,23 @@ from .field_types import array_fields, field_problems, field_types, unknown, usa
 from .tuples import tuples_for_lists
 
 
-class Validated:
-    """Base class of dataclasses whose fields are validated when an object is made, copied or unpickled.
-
-    Raises ObjectError, which names the class, the field, the value and the remedy, also for unknown keywords. Lists and
-    arrays of numbers become tuples. Fields that are arrays keep read-only views: they share the memory of the array
-    that was given, which stays writable for its owner, who must not change it any more.
-    """
+class KnownFields:
+    """Base class of dataclasses that raise ObjectError for unknown keywords, with the closest one."""
 
     def __new__(cls, *values: object, **named: object) -> Self:
         known = field_types(cls)
         if wrong := [name for name in named if name not in known]:
             raise ObjectError(cls.__name__, [f': the field "{name}" {unknown(name, known)}' for name in wrong])
         return super().__new__(cls)
+
+
+class Validated(KnownFields):
+    """Base class of dataclasses whose fields are validated when an object is made, copied or unpickled.
+
+    Raises ObjectError, which names the class, the field, the value and the remedy. Lists and arrays of numbers become
+    tuples. Fields that are arrays keep read-only views: they share the memory of the array that was given, which stays
+    writable for its owner, who must not change it any more.
+    """
 
     def __post_init__(self) -> None:
         arrays = array_fields(type(self))
