@@ -162,9 +162,11 @@ def test_movements_are_shown_in_time_and_then_whole(live: Live, device: Device) 
 
 def test_mistakes_are_told_and_the_last_picture_stays(live: Live, device: Device) -> None:
     good = whole(live)
-    live.edit(replace(live.scene, camera=replace(live.scene.camera, fov_degrees=180.0)))
+    wrong = replace(live.scene)
+    wrong.environment = 3  # type: ignore[assignment]
+    live.edit(wrong)
     seen = whole(live)
-    assert seen.error and "camera.fov_degrees: 180" in seen.error and seen.pixels is good.pixels
+    assert seen.error and "environment: 3 is not of type" in seen.error and seen.pixels is good.pixels
     live.choose(replace(live.settings, device="no such device"))
     assert "no such device" in (whole(live).error or "")
     live.choose(replace(live.settings, device=device.info.index))

@@ -211,7 +211,8 @@ def test_every_field_of_all_that_is_seen_counts() -> None:
             for thing in things(getattr(content, part)):
                 for each in fields(thing):
                     value = getattr(thing, each.name)
-                    object.__setattr__(thing, each.name, [12.34] if isinstance(value, list) else 12.34)
+                    other_value = "other" if isinstance(value, str) else 12.34
+                    object.__setattr__(thing, each.name, [12.34] if isinstance(value, list) else other_value)
                     try:
                         other = None if is_dataclass(value) else scene_hash(content)
                     except (AttributeError, SceneError):  # the hash made a copy, or read an attribute of that field

@@ -72,7 +72,7 @@ def test_far_scenes_have_cameras_in_their_frame(device: Device) -> None:
 
 def test_what_cannot_be_looked_at_is_refused(device: Device, tmp_path: Path) -> None:
     renderer = Renderer(room(), size=(8, 8), device=device.info.index)
-    with pytest.raises(SceneError, match="camera.look_at"):
+    with pytest.raises(SceneError, match="Camera.look_at"):
         renderer.look(replace(HERE, look_at=HERE.position))
     kept = Renderer(room(), size=(8, 8), device=device.info.index, checkpoint=tmp_path / "a.ck")
     with pytest.raises(UsageError, match="a checkpoint stores one image"):

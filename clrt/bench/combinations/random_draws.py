@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import MISSING, Field, fields
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from ...errors import ObjectError
 from ...scene.fields.limits import Ge, Gt, Le, Limit, Lt
 from ...scene.light_images import LightImage
 from ...scene.materials.material import Material
@@ -86,9 +88,9 @@ class Draws:
 
     def material(self, kind: type[Material], **given: Any) -> Material:
         """Return a random material of a type whose fields do not conflict."""
-        while (material := self.record(kind, **given)).conflicts():
-            pass
-        return material
+        while True:
+            with suppress(ObjectError):
+                return self.record(kind, **given)
 
     def _field(self, hint: Any, field: Field[Any], specular: bool) -> Any:
         """Return a random value of a field; specular: whether it belongs to a material that is specular by default."""

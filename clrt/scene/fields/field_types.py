@@ -1,6 +1,7 @@
 """Validation of plain values against a dataclass's field types, with problems as sentences.
 
-The scene file and scenes built in Python are both validated here, so the limits and messages are the same.
+The scene file and objects made in Python are both validated here, so the limits and messages are the same. Imports no
+numpy, as the command line reads its options from render settings.
 """
 
 from __future__ import annotations

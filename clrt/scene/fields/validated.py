@@ -33,14 +33,13 @@ class Validated(KnownFields):
         for name in arrays:
             object.__setattr__(self, name, read_only(getattr(self, name)))
         tuples_for_lists(self, without=arrays)
-        self.check()
+        if faults := self.faults():
+            raise ObjectError(self.title, faults)
         for name, value in usable(type(self), self._given()).items():
             object.__setattr__(self, name, value)
 
     def check(self) -> None:
-        """Raise ObjectError if a field is invalid."""
-        if faults := self.faults():
-            raise ObjectError(self.title, faults)
+        """Raise ObjectError if a field is invalid that was assigned since the last time, for which see `Editable`."""
 
     @property
     def title(self) -> str:
@@ -73,15 +72,19 @@ class Editable(Validated):
 
     _valid = False
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        vars(self)["_valid"] = True
+
     def __setattr__(self, name: str, value: object) -> None:
         arrays = array_fields(type(self))
         object.__setattr__(self, name, read_only(value) if name in arrays else value)
         vars(self).pop("_valid", None)
 
     def check(self) -> None:
-        """Raise ObjectError if a field is invalid; does nothing if none was assigned since the last time."""
         if not self._valid:
-            super().check()
+            if faults := self.faults():
+                raise ObjectError(self.title, faults)
             vars(self)["_valid"] = True
 
 

@@ -1,8 +1,8 @@
 """Materials: plain data, one dataclass each. A material's BSDF is `kernels/bsdf/<kernel>.cl`.
 
 To add one: write its kernel file, write its dataclass here and list it in MATERIALS, where the scene file, the
-validation, the packing and the tests of every BSDF find it. Field types carry their limits (limits.py), which
-`validate` checks for scenes from files and from Python alike. MetallicRoughness and Plastic have files of their own.
+validation, the packing and the tests of every BSDF find it. Field types carry their limits (limits.py), which are
+checked when a material is made, from a file or in Python. MetallicRoughness and Plastic have files of their own.
 """
 
 from __future__ import annotations
