@@ -12,7 +12,7 @@ class CommandGroup(click.Group):
         self, context: click.Context, arguments: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if arguments and not arguments[0].startswith("-") and self.get_command(context, arguments[0]) is None:
-            from ..scene.fields.field_types import unknown  # imports numpy, which valid commands do not need yet
+            from ..scene.fields.field_types import unknown  # valid commands do not need it
 
             context.fail(f'command "{arguments[0]}" {unknown(arguments[0], self.list_commands(context))}')
         return super().resolve_command(context, arguments)

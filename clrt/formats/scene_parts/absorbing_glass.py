@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import exp, isfinite
 
 from ...errors import SceneError
+from ...scene.fields.field_types import FLOAT32_MAX
 from ...scene.materials.material_types import Dielectric
 
 
@@ -19,7 +20,7 @@ def absorbing_glass(glass: Dielectric, rates: Sequence[float], at: str) -> Diele
         if not isfinite(rate) or rate < 0:
             raise SceneError(f"{at}: absorbs {rate:g} per length; write at least 0")
     most = max(rates)
-    if not most or not isfinite(1 / most):
+    if most * FLOAT32_MAX <= 1:  # over any distance
         return glass
     red, green, blue = (exp(-rate / most) for rate in rates)
     return replace(glass, attenuation_color=(red, green, blue), attenuation_distance=1 / most)
