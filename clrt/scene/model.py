@@ -182,8 +182,8 @@ class Environment(Editable):
     Direction to texel: u = atan2(x, −z)/2π mod 1, v = acos(y)/π, row 0 on top; `rotation_degrees` rotates the
     environment about +Y, counter-clockwise seen from above. Radiance = strength · (color or texel). camera_visible:
     whether the camera sees it and the discs of the suns behind the scene; if not, it sees black there. light_group: the
-    name of the layer that its light is stored in (docs/light-groups.md), "" for the rest. The image is read-only, as the
-    arrays of `Mesh`.
+    name of the layer that its light is stored in (docs/light-groups.md), "" for the rest. The image is read-only, as
+    the arrays of `Mesh`.
     """
 
     color: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
