@@ -68,7 +68,9 @@ if TYPE_CHECKING:
     from .scene.model import (
         Backdrop as Backdrop,
         Camera as Camera,
+        Display as Display,
         Environment as Environment,
+        Ground as Ground,
         Instance as Instance,
         Mesh as Mesh,
         RenderSettings as RenderSettings,
@@ -123,7 +125,17 @@ _HOME = {
         "Plastic",
     ),
     "formats.trimesh_models": ("Scene",),  # which may contain meshes of trimesh
-    "scene.model": ("Backdrop", "Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Sphere"),
+    "scene.model": (
+        "Backdrop",
+        "Camera",
+        "Display",
+        "Environment",
+        "Ground",
+        "Instance",
+        "Mesh",
+        "RenderSettings",
+        "Sphere",
+    ),
     "scene.stereo": ("stereo_pair",),
     "scene.view": ("View",),
     "scene.materials.textures": ("Picture", "Texture"),

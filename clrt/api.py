@@ -13,6 +13,7 @@ from .file_names import StrPath
 from .float_errors import with_default_errors
 from .formats.load_scene import load as _load
 from .formats.model_choice import ModelChoice
+from .formats.model_look import Look
 from .formats.trimesh_models import is_trimesh, scene_of
 from .output.data_images import check_denoisable
 from .output.denoise import Denoiser, denoised
@@ -47,6 +48,8 @@ def load(
     ignore_extensions: Iterable[str] = (),
     approximate: bool = False,
     parameters: Mapping[str, str] = {},
+    look: Look | None = None,
+    size: tuple[int, int] | None = None,
 ) -> Scene:
     """Load a scene file (.toml, Mitsuba's .xml, pbrt's .pbrt) or a bare model (glTF, USD, OBJ, PLY, STL, OFF or 3MF).
 
@@ -54,7 +57,8 @@ def load(
 
     camera: the name of one of the file's cameras to use, or for a bare model "front", "right", "back" or "left". For a
     bare model also up: which of its axes points up, "x", "y" or "z"; unit: that of its coordinates, "m", "cm", "mm",
-    "in" or "ft", which become meters.
+    "in" or "ft", which become meters; look: its light and ground, "studio" (the default of a model without lights of
+    its own), "sky" or "none"; size: (width, height) of its images, which its camera frames it in.
 
     Of a bare glTF file, by name or number: `scene` is one of its scenes, `variant` one of the variants of its materials
     (KHR_materials_variants), and `animation` one of its animations, which `animate` renders. time: the seconds at which
@@ -81,7 +85,9 @@ def load(
     )
 
     def load_file(file: StrPath) -> Scene:
-        return _load(file, camera, up, unit, choice, approximate=approximate, parameters=parameters)
+        return _load(
+            file, camera, up, unit, choice, approximate=approximate, parameters=parameters, look=look, size=size
+        )
 
     return scene_of(path, load_file) if is_trimesh(path) else load_file(cast(StrPath, path))
 
@@ -103,7 +109,7 @@ def render(
     Raises subclasses of ClrtError.
     """
     denoiser = Denoiser() if denoise else None
-    scene = scene if isinstance(scene, Scene) else load(scene)
+    scene = scene if isinstance(scene, Scene) else load(scene, size=options.get("size"))
     stops = Stops(options.get("spp"), time, error)
     return _rendered(_renderer(scene, stops, denoise, options), denoiser, reference, stops)
 
@@ -124,7 +130,7 @@ def animate(
     of ClrtError.
     """
     denoiser = Denoiser() if denoise else None
-    scene = scene if isinstance(scene, Scene) else _load(scene, moving=True)
+    scene = scene if isinstance(scene, Scene) else _load(scene, moving=True, size=options.get("size"))
     renderer, stops = None, Stops(options.get("spp"), time, error)
     for number, still in _frames(scene, frames):
         if renderer is None:

@@ -58,9 +58,11 @@ def command(
     from ..device.open import open_device
     from ..output.json_text import json_text
     from ..rendering.renderer_options import choices_of, settings_of
+    from ..scene.on_ground import on_ground
 
-    content = loading.load(scene)
+    content = loading.load(scene, size=given.get("size"))
     content.render = settings = settings_of(content.render, given)
+    content = on_ground(content)
     pixel = pixel or (settings.size[0] // 2, settings.size[1] // 2)
     paths = trace_pixel(content, open_device(device), pixel, choices_of(given))
     names = SceneNames(content, paths.compiled)

@@ -15,10 +15,12 @@ import click
 
 from ..errors import OutputError, UsageError
 from .option_groups import flag
+from .option_types import OneOf
 from .outputs import Outputs
 
 if TYPE_CHECKING:
     from ..rendering.compile.choices import Choices
+    from ..scene.animation import Turns
     from ..scene.model import Scene
 
 #: Fields of Outputs that do not affect an image's content.
@@ -57,6 +59,12 @@ class FrameOptions:
         metavar="N",
         help="Orbit once around the point the camera looks at, in N frames.",
     )
+    turns: Turns | None = flag(
+        "--turntable-turns",
+        type=OneOf(("camera", "object")),
+        help="camera: the turntable's camera moves past the lights (default); object: environment and lights stay with "
+        "the camera.",
+    )
     fps: float | None = flag(
         "--fps", type=click.FloatRange(min=0, min_open=True), help="Frames per second; default: the scene's."
     )
@@ -86,7 +94,7 @@ class FrameSequence:
         from ..scene.camera_path import frames, turntable as turned
 
         if asked.turntable is not None:
-            scene = turned(scene, asked.turntable, asked.fps or Animation.fps)
+            scene = turned(scene, asked.turntable, asked.fps or Animation.fps, asked.turns or "camera")
         elif asked.fps is not None and scene.animation is not None:
             scene = replace(scene, animation=replace(scene.animation, fps=asked.fps))
         self._moving, (_, first) = scene, next(frames(scene, self.chosen))
@@ -146,7 +154,7 @@ class FrameSequence:
             still = replace(still, render=scene.render)
             if last is None or not same_world(still, last):
                 last, facts = still, {**facts_of(still, choices), "camera": ""}
-            made_of = repr((sorted(facts.items()), still.camera, goal, shown))
+            made_of = repr((sorted(facts.items()), still.camera, goal, shown, still.display))
             digest = hashlib.sha256(made_of.encode()).hexdigest()
             outputs = replace(self._of(number).of_scene(still), header={"frame": number, "frame_hash": digest})
             done = self.resume and all(

@@ -50,13 +50,14 @@ def command(
     from ..rendering.aovs import chosen_aovs
     from ..rendering.compile.compile_scene import compile_scene
     from ..rendering.renderer_options import choices_of
+    from ..scene.on_ground import on_ground
     from .scene_lists import lights_in, materials_in
     from .scene_report import report_lines, scene_report
 
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = loading.load(scene)
     choices = choices_of({**chosen, "aovs": names})
-    compiled = compile_scene(content, choices, device=_device(selector))
+    compiled = compile_scene(on_ground(content), choices, device=_device(selector))
     report = {
         **scene_report(content, compiled, names),
         "material_list": materials_in(content),

@@ -11,6 +11,7 @@ from .option_groups import flag
 from .option_types import Assignment, Finite, OneOf
 
 if TYPE_CHECKING:
+    from ..formats.model_look import Look
     from ..scene.model import Scene
 
 
@@ -31,6 +32,11 @@ class LoadOptions:
     )
     unit: Unit | None = flag(
         "--unit", type=OneOf(get_args(Unit)), help="Unit of a bare model's coordinates, to convert them to meters."
+    )
+    look: Look | None = flag(
+        "--look",
+        type=OneOf(("studio", "sky", "none")),
+        help="Light and ground of a bare model: studio, sky or none. Default: studio, or sky for a file with lights.",
     )
     model_scene: str | None = flag(
         "--scene", metavar="NAME", help="Scene of a bare glTF file, by name or number; see `clrt info`."
@@ -79,8 +85,9 @@ class LoadOptions:
         help="Value of a parameter $NAME of a Mitsuba scene, which replaces its default. May be repeated.",
     )
 
-    def load(self, path: Path, moving: bool = False) -> Scene:
-        """Load the scene or model. moving: whether its animation is rendered. Raises SceneError."""
+    def load(self, path: Path, moving: bool = False, size: tuple[int, int] | None = None) -> Scene:
+        """Load the scene or model. moving: whether its animation is rendered; size: of a bare model's images, if not
+        the default one. Raises SceneError."""
         from ..formats.load_scene import load
         from ..formats.model_choice import ModelChoice
 
@@ -92,4 +99,5 @@ class LoadOptions:
             light_unit=self.light_unit,
             ignore_extensions=self.ignore_extensions or None,
         )
-        return load(path, self.camera, self.up, self.unit, choice, moving, self.approximate, dict(self.parameters))
+        given = self.approximate, dict(self.parameters), self.look, size
+        return load(path, self.camera, self.up, self.unit, choice, moving, *given)

@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 @dataclass
 class Outputs:
     """Requested outputs. inputs: the scene, and the reference if any; pictures: files of the final image, with its
-    AOVs; denoise: whether the raw images are stored as well; view, exposure: of .png images; force: whether read-only
-    files are replaced; header: metadata in addition to the report; spool: one of `pictures` that is only needed for a
-    video: it is not reported, and has no accompanying files; pipes: further destinations of the image, without
-    accompanying files. If an output cannot be written, the others still are, and it is written to a fallback location
-    if possible."""
+    AOVs; denoise: whether the raw images are stored as well; view, exposure: of .png images, view None for the
+    scene's; force: whether read-only files are replaced; header: metadata in addition to the report; spool: one of
+    `pictures` that is only needed for a video: it is not reported, and has no accompanying files; pipes: further
+    destinations of the image, without accompanying files. If an output cannot be written, the others still are, and it
+    is written to a fallback location if possible."""
 
     inputs: tuple[Path, ...]
     pictures: tuple[Path, ...]
     aovs: tuple[str, ...]
     denoise: bool
-    view: str
+    view: str | None
     exposure: float
     report: Path | None
     plot: Path | None
@@ -81,7 +81,7 @@ class Outputs:
         from ..output.images import check_writable
         from ..output.view_transform import check_view
 
-        check_view(self.view, self.exposure)
+        check_view(self.view or "srgb", self.exposure)
         if self.aovs and (
             all(picture.suffix.lower() == ".hdr" for picture in self._kept)
             and all(pipe.suffix != ".exr" for pipe in self.pipes)
@@ -155,7 +155,7 @@ class Outputs:
         told = {**banded.summary(), "total_seconds": time.perf_counter() - STARTED}
 
         def save(path: Path) -> None:
-            banded.save(path, self.view, self.exposure, header_of(told))
+            banded.save(path, self.view or told["view"], self.exposure, header_of(told))
 
         for path in self.pictures:
             self._write(path, save)

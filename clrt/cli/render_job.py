@@ -92,6 +92,8 @@ class RenderJob:
 
     def _sequence(self) -> FrameSequence | None:
         """Return the frames to render; None for a still image."""
+        if self.frames.turns is not None and self.frames.turntable is None:
+            raise UsageError("--turntable-turns is what a turntable turns; add --turntable N")
         if not self.frames.many:
             return None
         if self.frames.frames is not None and self.loading.animation_time is not None:
@@ -137,7 +139,7 @@ class RenderJob:
 
         progress.phase("load")
         with files_read() as inputs:
-            content = self.loading.load(self.scene, moving=self.frames.frames is not None)
+            content = self.loading.load(self.scene, moving=self.frames.frames is not None, size=self.options["size"])
         if self.sequence is None:
             self.results = self.results.of_scene(content)
             self.results.check_apart(inputs, self.saving.checkpoint)
@@ -155,13 +157,14 @@ class RenderJob:
     def _goal(self, content: Scene) -> Goal:
         """Return when the render of this scene stops."""
         from ..output.data_images import check_denoisable
-        from ..rendering.stop_conditions import planned_spp
+        from ..rendering.stop_conditions import planned_error, planned_spp
 
         stop = self.stop
         planned = planned_spp(content.render, stop.spp, stop.seconds, stop.error)
         if self._denoiser is not None:
             check_denoisable(self.options["integrator"] or content.render.integrator)
-        return Goal(planned, stop.seconds, stop.error, stop.error_percentile)
+        target = planned_error(content.render, stop.spp, stop.seconds, stop.error)
+        return Goal(planned, stop.seconds, target, stop.error_percentile)
 
     def _render(self, renderer: Renderer, goal: Goal, expected: Any, progress: Progress) -> bool:
         """Render the image, or all frames; return False if interrupted."""

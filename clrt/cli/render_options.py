@@ -47,12 +47,11 @@ class OutputOptions:
     )
     report: Path | None = flag("--report", type=FILE, metavar="FILE.json", help="Write a report of the render.")
     plot: Path | None = flag("--plot", type=FILE, metavar="FILE.png", help="Plot error against time there.")
-    view: str = flag(
+    view: str | None = flag(
         "--view",
-        default="srgb",
-        show_default=True,
         metavar="NAME",
-        help="View transform of .png images: srgb, agx, pbr_neutral, reinhard, raw, aces, ocio:VIEW.",
+        help="View transform of .png images: srgb, agx, pbr_neutral, reinhard, raw, aces, ocio:VIEW. Default: the "
+        "scene's, which is pbr_neutral for a bare model.",
     )
     exposure: float = flag("--exposure", default=0.0, metavar="EV", help="Exposure of .png images, in stops.")
     force: bool = flag("--force", default=False, is_flag=True, help="Replace files that are read-only.")

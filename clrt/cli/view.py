@@ -31,11 +31,11 @@ from .options import NAMES
     metavar="SEL",
     help="Device to use; see `clrt devices`. Repeat to use several.",
 )
-@click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform; see `clrt render`.")
+@click.option("--view", metavar="NAME", help="View transform; see `clrt render`.")
 @click.option("--exposure", default=0.0, metavar="EV", help="In stops.")
 @verbose_option
 def command(
-    scene: Path, loading: LoadOptions, devices: tuple[str, ...], view: str, exposure: float, **given: Any
+    scene: Path, loading: LoadOptions, devices: tuple[str, ...], view: str | None, exposure: float, **given: Any
 ) -> None:
     """Show SCENE, a .toml scene or a model, in an interactive window: navigate, edit, watch it refine
     (docs/window.md)."""
@@ -50,15 +50,15 @@ def command(
     from ..scene.fields.field_types import field_problems
     from ..window.app import App, DisplaySettings
 
-    check_view(view, exposure)
+    check_view(view or "srgb", exposure)
     for selector in devices or (None,):
         select(selector)
     chosen = {name: value for name, value in given.items() if value is not None}
     if problems := field_problems(RenderSettings, chosen, "render"):
         raise UsageError("\n".join(problems))
-    content = loading.load(scene)
+    content = loading.load(scene, size=chosen.get("size"))
     content.render = replace(content.render, **chosen)
-    app = App(content, Settings(device=devices or None), DisplaySettings(view, exposure))
+    app = App(content, Settings(device=devices or None), DisplaySettings(view or content.display.view, exposure))
     with Interruptible(app.close) as interruptible:
         app.run()
     if interruptible.asked:

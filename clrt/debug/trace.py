@@ -21,6 +21,7 @@ from ..rendering.compile.compile_scene import DEBUG, CompiledScene, compile_scen
 from ..rendering.compile.features import WITH_LIGHT
 from ..rendering.error_estimate.adaptive_sampling import most_planned
 from ..scene.model import RenderSettings, Scene
+from ..scene.on_ground import on_ground
 from .record import VERTEX, PathEnd, vertex_preamble
 
 #: Maximum records per launch, unless a single sample needs more.
@@ -76,7 +77,7 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
     """
     settings = scene.render
     _check(settings, pixel)
-    compiled = compile_scene(scene, choices, DEBUG, device)
+    compiled = compile_scene(on_ground(scene), choices, DEBUG, device)
     compiled = replace(compiled, preamble=f"{compiled.preamble}\n{vertex_preamble()}")
     plan = LaunchPlan.of(settings, most_planned(settings.spp, settings.adaptive))
     launch, depth = plan.record(compiled), plan.max_depth

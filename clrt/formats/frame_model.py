@@ -18,7 +18,7 @@ VIEWS = {"front": 0.0, "right": 90.0, "back": 180.0, "left": 270.0}
 #: Direction from the model to the camera: in front (+Z), 28° to the right and 17° above.
 THREE_QUARTER = (0.53, 0.34, 1.0)
 FOV_DEGREES = 30.0
-#: Fraction of a square image's width or height, whichever is tighter, that the model fills.
+#: Fraction of an image's width or height, whichever is tighter, that the model fills.
 FILL = 0.92
 #: Maximum number of iterations that center the model along the looser axis; it converges after 3 to 6.
 ROUNDS = 20
@@ -27,12 +27,14 @@ Doubles = NDArray[np.float64]
 IDENTITY: Matrix = np.eye(4)
 
 
-def frame(meshes: list[Mesh], instances: Sequence[Instance] = (), turn: Matrix = IDENTITY) -> Camera:
-    """Return the nearest three-quarter view that has every vertex inside a square image, with the model centered.
+def frame(
+    meshes: list[Mesh], instances: Sequence[Instance] = (), turn: Matrix = IDENTITY, aspect: float = 1.0
+) -> Camera:
+    """Return the nearest three-quarter view that has every vertex inside the image, with the model centered.
 
     Only vertices that faces use count; instances count by the corners of their mesh's bounding box. The model fills
     FILL of the image's width or height, and its left and right margins are equal, as are the top and bottom ones.
-    turn: rotation of the camera about +Y.
+    turn: rotation of the camera about +Y; aspect: the image's width over its height.
     """
     back = turn[:3, :3] @ THREE_QUARTER / np.linalg.norm(THREE_QUARTER)
     right = np.cross([0.0, 1.0, 0.0], back) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], back))
@@ -40,12 +42,13 @@ def frame(meshes: list[Mesh], instances: Sequence[Instance] = (), turn: Matrix =
     vertices = _extremes(meshes, instances)
     middle = vertices.min(axis=0) / 2 + vertices.max(axis=0) / 2
     x, y, z = axes @ (vertices - middle).T
+    x /= aspect  # in a square image the same camera would see it so
     # From (cx, cy, d) a vertex is inside if |x - cx| <= slope (d - z): cx + slope d and slope d - cx have lower bounds,
     # whose sum bounds d alone.
     slope = FILL * math.tan(math.radians(FOV_DEGREES) / 2)
     distance = max(float(np.max(slope * z + s) + np.max(slope * z - s)) for s in (x, y)) / (2 * slope)
     distance = distance if distance > 0 else 1.0
-    center = middle + np.array([_center(x, z, distance), _center(y, z, distance), 0.0]) @ axes
+    center = middle + np.array([aspect * _center(x, z, distance), _center(y, z, distance), 0.0]) @ axes
     return Camera(position=_vector(center + distance * back), look_at=_vector(center), fov_degrees=FOV_DEGREES)
 
 

@@ -17,14 +17,15 @@ from typing import Any, get_args
 from ..errors import SceneError, UsageError, check_choice
 from ..file_names import StrPath
 from ..scene.axes_and_units import CONVERTED, Axis, Unit
-from ..scene.default_sky import SUN, default_sky
-from ..scene.geometry.transform import rotation, transform_light, translation
-from ..scene.model import Instance, Mesh, Model, Scene
+from ..scene.geometry.transform import rotation, translation
+from ..scene.model import Instance, Mesh, Model, RenderSettings, Scene
 from ..scene.model_pose import with_poses
 from ..scene.provenance import source_of_model
+from ..scene.fields.field_types import field_problems
 from ..scene.validation.validate import scene_problems
 from .frame_model import VIEWS, frame
 from .model_choice import DEFAULT, ModelChoice
+from .model_look import Look, default_look, look_of
 from .models import SUFFIXES, read_model
 from .referenced_files import check_file, name_of
 from .toml.instance_table import placed
@@ -48,22 +49,25 @@ def load(
     moving: bool = False,
     approximate: bool = False,
     parameters: Mapping[str, str] = {},
+    look: Look | None = None,
+    size: tuple[int, int] | None = None,
 ) -> Scene:
-    """Load a scene from a .toml file, a Mitsuba .xml or pbrt .pbrt file, a model file (whose meshes get a sky, a sun
+    """Load a scene from a .toml file, a Mitsuba .xml or pbrt .pbrt file, a model file (whose meshes get light, a ground
     and a camera), or from standard input for "-".
 
     A glTF model's first camera and its lights are used if it has any. camera: name of another camera to use, of a scene
     or a model file, or for a model one of VIEWS. up, unit: of a model file, if they are not as it or its format says;
     choice: for bare models; moving: whether a camera that frames a model frames its animation, as it does if one is
     chosen; approximate: of a Mitsuba or pbrt scene, whether what clrt lacks is replaced or left out, with warnings;
-    parameters: of a Mitsuba scene, values of $NAME. Raises one SceneError with all problems of the file, each as "FILE:
-    object: value is wrong; remedy".
+    parameters: of a Mitsuba scene, values of $NAME; look: of a bare model, by default that of `default_look`; size: of
+    the images, which a model's camera frames it in. Raises one SceneError with all problems of the file, each as
+    "FILE: object: value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
         raise SceneError(f'{path!r} is not the path of a scene; give a file name, such as "scene.toml"')
-    for name, value, known in (("up", up, Axis), ("unit", unit, Unit)):
+    for name, value, known in (("up", up, Axis), ("unit", unit, Unit), ("look", look, Look)):
         check_choice(name, value, (None, *get_args(known)))
-    _check_types(camera, approximate, parameters)
+    _check_types(camera, approximate, parameters, size)
     path = Path(path)
     check_scene(path)
     reader = _load_toml if path == STDIN else _READERS.get(_suffix(path))
@@ -71,16 +75,18 @@ def load(
         raise UsageError(f"{path}: approximate is for Mitsuba's and pbrt's scenes; leave it out")
     if parameters and reader is not _load_mitsuba:
         raise UsageError(f"{path}: -D {next(iter(parameters))}: parameters are for Mitsuba's scenes; leave them out")
-    if reader and (up or unit):
-        raise UsageError(f'{path}: up and unit are for model files; in a scene file, write up = "z" in a [[mesh]]')
-    if reader and choice != DEFAULT:
-        raise UsageError(f"{path}: {choice.given()[0]}: is for bare models; leave {choice.given()[0]} out")
+    if reader:
+        _check_not_of_models(path, up, unit, look, choice)
     if approximate:
         reader = partial(_APPROXIMATING[_suffix(path)], approximate=True)
     if parameters:
         reader = partial(_load_mitsuba, approximate=approximate, parameters=parameters)
     with _named(path):
-        scene, problems = reader(path) if reader else (_load_model(path, camera, up, unit, choice, moving), [])
+        scene, problems = (
+            reader(path) if reader else (_load_model(path, camera, up, unit, choice, moving, look, size), [])
+        )
+    if size is not None:
+        scene.render = replace(scene.render, size=size)
     views = [] if reader else [name for name in VIEWS if name not in scene.cameras]
     if camera is not None and camera not in views:
         scene.camera = scene.cameras.get(camera, scene.camera)
@@ -91,10 +97,22 @@ def load(
     return scene
 
 
-def _check_types(camera: object, approximate: object, parameters: object) -> None:
+def _check_not_of_models(path: Path, up: object, unit: object, look: object, choice: ModelChoice) -> None:
+    """Raise UsageError if a scene file is given arguments for models."""
+    if up or unit:
+        raise UsageError(f'{path}: up and unit are for model files; in a scene file, write up = "z" in a [[mesh]]')
+    if look:
+        raise UsageError(f"{path}: look is for model files; a scene file has lights of its own, so leave look out")
+    if choice != DEFAULT:
+        raise UsageError(f"{path}: {choice.given()[0]}: is for bare models; leave {choice.given()[0]} out")
+
+
+def _check_types(camera: object, approximate: object, parameters: object, size: object) -> None:
     """Raise UsageError unless these arguments of `load` are of their types."""
     if not isinstance(camera, str | None):
         raise UsageError(f"camera {camera!r} is not a name")
+    if size is not None and (problems := field_problems(RenderSettings, {"size": size}, "load")):
+        raise UsageError("\n".join(problems))
     if not isinstance(approximate, bool):
         raise UsageError(f"approximate {approximate!r} is not a boolean")
     if not isinstance(parameters, Mapping) or not all(isinstance(each, str) for each in chain(*parameters.items())):
@@ -112,12 +130,19 @@ def check_scene(path: Path) -> None:
 
 
 def _load_model(
-    path: Path, view: str | None, up: Axis | None, unit: Unit | None, choice: ModelChoice, moving: bool
+    path: Path,
+    view: str | None,
+    up: Axis | None,
+    unit: Unit | None,
+    choice: ModelChoice,
+    moving: bool,
+    look: Look | None,
+    size: tuple[int, int] | None,
 ) -> Scene:
-    """Load a bare model with the default sky, its own lights or the sun, and its first camera or one that frames it.
+    """Load a bare model with its own lights or those of the look, and its first camera or one that frames it.
 
-    view: one of VIEWS replaces the model's cameras, except one of that name. up, unit: those of the file if None;
-    choice, moving: see `load`.
+    view: one of VIEWS replaces the model's cameras, except one of that name, as another name chooses one. up, unit:
+    those of the file if None; choice, moving, look, size: see `load`.
     """
     model = read_model(path, choice=choice)
     placing: dict[str, Any] = {"up": up or model.up, "unit": unit or model.unit}
@@ -135,19 +160,24 @@ def _load_model(
             "%s: %s; --light-unit radiometric takes them as W/sr and W/m²", path, CONVERTED[model.converted_from]
         )
     angle = None if view is None or view in model.cameras else VIEWS.get(view)
-    turn = rotation((0.0, angle or 0.0, 0.0))
-    camera = next(iter(model.cameras.values()), None) if angle is None else None
-    sun = transform_light(SUN, turn) if angle else SUN
+    width, height = size or RenderSettings.size
+    framed = _framed(model, moving or choice.animation is not None)
+    camera = model.cameras.get(view or next(iter(model.cameras), "")) if angle is None else None
+    if camera is None:
+        camera = frame(*framed, rotation((0.0, angle or 0.0, 0.0)), width / height)
+    look = look or default_look(model)
+    contents = {**model.contents, "look": [look]}
     return Scene(
         meshes=model.meshes + model.emitters,
         instances=model.instances,
-        camera=camera or frame(*_framed(model, moving or choice.animation is not None), turn),
+        camera=camera,
         cameras=model.cameras,
-        environment=model.environment or default_sky(),
-        lights=model.lights if model.lights or model.emitters or model.environment else [sun],
         name=name_of(path),
         animation=model.animation,
-        source=source_of_model(path, model, placing, whole=replace(choice, light_unit=None) == DEFAULT),
+        source=source_of_model(
+            path, replace(model, contents=contents), placing, whole=replace(choice, light_unit=None) == DEFAULT
+        ),
+        **look_of(look, model, camera, angle or 0.0, framed),
     )
 
 

@@ -125,7 +125,8 @@ class LiveRenderer:
         row, column = (min(max(int(at * size), 0), size - 1) for at, size in zip((y, x), self._met.shape))
         number, scene = int(self._met[row, column]), renderer.scene
         things: list[Thing] = [*scene.meshes, *scene.instances, *scene.spheres]
-        return None if number < 0 else things[number]
+        is_ground = number == len(renderer.given.meshes) < len(scene.meshes)
+        return None if number < 0 or is_ground else things[number]
 
     def abandon(self) -> None:
         """Make `states` end soon; thread-safe."""

@@ -75,14 +75,15 @@ class Image(Validated):
         }
 
     @with_default_errors
-    def save(self, path: StrPath, *, view: str = "srgb", exposure: float = 0.0) -> Path:
+    def save(self, path: StrPath, *, view: str | None = None, exposure: float = 0.0) -> Path:
         """Write .exr or .hdr (linear), or .png, .jpg, .webp, .tif (through `view`, after multiplication by 2^exposure).
 
+        view: by default that of the scene, `report["view"]`, or srgb.
         The AOVs become layers of an .exr, and separate files for formats with a view. Alpha is associated in an .exr,
         and unassociated in the others that have it; a .jpg and an .hdr show the scene over black. Raises OutputError
         if that fails.
         """
-        pixels = self.layers
+        pixels, view = self.layers, view or self.report.get("view", "srgb")
         if is_shown(Path(path)) and (data := self._shown_data()) is not None:
             pixels, view, exposure = data, "raw", 0.0
         write_image(Path(path), pixels, metadata=self.metadata(), view=view, exposure=exposure, aovs=self.aovs)

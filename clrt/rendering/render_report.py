@@ -24,6 +24,7 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
         "width": width,
         "height": height,
         "spp": state.spp,
+        "view": renderer.scene.display.view,
         **{name: value for name, value in values_of(settings, renderer.choices).items() if name != "size"},
         "seconds": renderer.seconds,
         "samples": samples,

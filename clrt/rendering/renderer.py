@@ -15,6 +15,7 @@ from ..device.open import Selectors, name_of, open_devices
 from ..errors import DeviceError
 from ..float_errors import with_default_errors
 from ..scene.model import Camera, RenderSettings, Scene
+from ..scene.on_ground import is_below, on_ground
 from ..scene.validation.validate import check_is_scene, validate
 from .accumulation.accumulation import Accumulation
 from .accumulation.launch_plan import LaunchPlan
@@ -43,7 +44,8 @@ from .thread_turns import ThreadTurns
 class Renderer:
     """Progressive renderer of a scene on one or more devices. Raises subclasses of ClrtError.
 
-    Options that are not given are taken from `scene.render`, or suit the device.
+    Options that are not given are taken from `scene.render`, or suit the device. given: the scene as it was given, with
+    these options; scene: the same on its ground, as it is rendered.
     """
 
     @with_default_errors
@@ -51,7 +53,8 @@ class Renderer:
         check_is_scene(scene)
         check_stops(options.get("spp"))
         percentile = checked_percentile(options.get("error_percentile"))
-        self.scene = replace(scene, render=settings_of(scene.render, options))
+        self.given: Scene = replace(scene, render=settings_of(scene.render, options))
+        self.scene: Scene = on_ground(self.given)
         self._aovs = Aovs(options.get("aovs"), self.settings.integrator)
         self.choices = choices_of(options)
         on_phase, before = options.get("on_phase"), options.get("before")
@@ -137,6 +140,10 @@ class Renderer:
         """
         check_of_none(self._checkpoints)
         validate(Scene(camera=camera, render=self.settings))
+        seen = replace(self.given, camera=camera)
+        if is_below(seen) != is_below(self.given):  # the ground is another
+            self.show(seen)
+            return
         with self._turns.one():
             self._asked_for = camera
             self._see()
@@ -150,11 +157,12 @@ class Renderer:
         """
         check_of_none(self._checkpoints)
         check_is_scene(scene)
-        if same_world(scene, self.scene):
+        if same_world(scene, self.given) and is_below(scene) == is_below(self.given):
             self.look(scene.camera)
             return
+        self.given = replace(scene, render=self.settings)
         with self._turns.one():
-            self._show(replace(scene, render=self.settings))
+            self._show(on_ground(self.given))
             self._asked_for = None
             self._begin()
 

@@ -21,6 +21,11 @@ def planned_spp(settings: RenderSettings, spp: int | None, time: float | None, e
     return settings.spp if spp is None and time is None and error is None else spp
 
 
+def planned_error(settings: RenderSettings, spp: int | None, time: float | None, error: float | None) -> float | None:
+    """Return the estimated error at which `passes` stops with these stop conditions; None if none does."""
+    return settings.error if spp is None and time is None and error is None else error
+
+
 def check_stops(spp: int | None, time: float | None = None, error: float | None = None) -> None:
     """Raise UsageError unless each stop condition that is given is a finite number above 0, and spp an integer."""
     given: list[tuple[str, Any, Any]] = [("spp", spp, Integral), ("time", time, Real), ("error", error, Real)]
@@ -54,8 +59,9 @@ class StopConditions:
 
     @staticmethod
     def of(settings: RenderSettings, spp: int | None, time: float | None, error: float | None) -> StopConditions:
-        """Return the stop conditions given, or else the scene's sample count. Raises UsageError like `check_stops`."""
-        return StopConditions(planned_spp(settings, spp, time, error), time, error, settings.adaptive)
+        """Return the stop conditions given, or else the scene's. Raises UsageError like `check_stops`."""
+        planned, target = planned_spp(settings, spp, time, error), planned_error(settings, spp, time, error)
+        return StopConditions(planned, time, target, settings.adaptive)
 
     def reached(self, done: int, seconds: float) -> str | None:
         """Return the stop reason if an image has reached the sample count or the time already, else None."""

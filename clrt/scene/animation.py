@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from .fields.limits import Gt, Lt
 from .fields.validated import Validated
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from .materials.material import Material
     from .model import Model
 
+#: What a turntable turns.
+Turns = Literal["camera", "object"]
 Vector = tuple[float, float, float]
 Positive = Annotated[float, Gt(0)]
 
@@ -41,11 +43,13 @@ class Animation(Validated):
     """Animation of the camera. fps: frames per second. keyframes: at least two, ascending, frame 0 at the first.
 
     turntable_seconds: replaces keyframes; the camera goes once around its `look_at` point, about its `up`, seen from
-    there counter-clockwise, or clockwise if below 0. The frame after the last would equal the first.
+    there counter-clockwise, or clockwise if below 0. The frame after the last would equal the first. turntable_turns:
+    with "object" the environment and the lights go around with the camera, as if the objects turned in front of them.
     """
 
     fps: Positive = 24.0
     turntable_seconds: float | None = None
+    turntable_turns: Turns = "camera"
     keyframes: tuple[Keyframe, ...] = ()
 
     @property

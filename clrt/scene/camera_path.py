@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields, replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
-from ..errors import SceneError, UsageError
-from .animation import Animation, Keyframe, ModelAnimation, SceneAnimation
-from .fields.field_types import field_problems
+from ..errors import SceneError, UsageError, check_choice
+from .animation import Animation, Keyframe, ModelAnimation, SceneAnimation, Turns
+from .fields.field_types import field_problems, show
 from .fields.keywords import with_known_keywords
+from .geometry.transform import rotation, transform_light, translation
 from .model import Camera, Scene
 from .model_pose import posed
 from .sky.sky import moving_sky, with_sky
@@ -22,16 +23,18 @@ MOST_FRAMES = 1_000_000
 
 
 @with_known_keywords
-def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
+def turntable(scene: Scene, frames: int, fps: float = Animation.fps, turns: Turns = "camera") -> Scene:
     """Return the scene with the camera going once around in this number of frames, while a scene file's models move.
 
-    Raises UsageError unless `frames` is at least 1 and `fps` is above 0 and finite.
+    turns: with "object", environment and lights go around with the camera, as if the objects turned instead. Raises
+    UsageError unless `frames` is at least 1, `fps` is above 0 and finite, and `turns` is known.
     """
     if not frames >= 1:
         raise UsageError(f"frames is {frames}; it must be at least 1")
     if not 0 < fps < np.inf:
         raise UsageError(f"fps is {fps}; it must be above 0 and finite")
-    around = Animation(fps=fps, turntable_seconds=frames / fps)
+    check_choice("turns", turns, get_args(Turns))
+    around = Animation(fps=fps, turntable_seconds=frames / fps, turntable_turns=turns)
     if isinstance(scene.animation, SceneAnimation):
         return replace(scene, animation=replace(scene.animation, camera=around, fps=fps))
     return replace(scene, animation=around)
@@ -64,10 +67,22 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
     else:
         cameras = _cameras(scene.camera, animation, np.array(numbers, np.float64))
         moving = ((number, replace(scene, camera=camera, animation=None)) for number, camera in zip(numbers, cameras))
-    if (sky := moving_sky(scene)) is None:
+    if (sky := moving_sky(scene)) is not None:
+        skies = [sky.after(number / animation.fps) for number in numbers]  # all are valid before the first is rendered
+        moving = ((number, with_sky(still, sky, now)) for (number, still), now in zip(moving, skies))
+    path = animation.camera if isinstance(animation, SceneAnimation) else animation
+    if path is None or path.turntable_seconds is None or path.turntable_turns == "camera":
         return moving
-    skies = [sky.after(number / animation.fps) for number in numbers]  # all are valid before the first is rendered
-    return ((number, with_sky(still, sky, now)) for (number, still), now in zip(moving, skies))
+    turn = 360 / count if path.turntable_seconds > 0 else -360 / count
+    return ((number, _lit_from(still, scene.camera, turn * number)) for number, still in moving)
+
+
+def _lit_from(scene: Scene, camera: Camera, degrees: float) -> Scene:
+    """Return the scene with its environment and lights turned about the vertical axis through the camera's look_at."""
+    x, y, z = camera.look_at
+    turn = translation((x, y, z)) @ rotation((0.0, degrees, 0.0)) @ translation((-x, -y, -z))
+    around = replace(scene.environment, rotation_degrees=scene.environment.rotation_degrees + degrees)
+    return replace(scene, environment=around, lights=[transform_light(light, turn) for light in scene.lights])
 
 
 def _moving_frames(scene: Scene, animation: SceneAnimation, numbers: Sequence[int]) -> Iterator[tuple[int, Scene]]:
@@ -112,6 +127,11 @@ def animation_problems(camera: Camera, animation: Animation) -> list[str]:
         ]
     if around == 0:
         return ["animation.turntable_seconds: is 0; write the duration of one turn"]
+    if around is not None and animation.turntable_turns == "object" and not _is_upright(camera):
+        return [
+            f"animation.turntable_turns: objects turn about +Y only, and the camera's up is {show(camera.up)}; write "
+            'up = [0, 1, 0] in [camera], or turntable_turns = "camera"'
+        ]
     times = [key.time for key in keys]
     problems = [
         f"keyframe[{i + 1}].time: {times[i + 1]:g} is not after the previous one, {times[i]:g}; write them "
@@ -134,6 +154,11 @@ def _unread_problems(camera: Camera, animation: Animation) -> list[str]:
         for name in camera.unread_fields()
         if any(getattr(key, name, None) is not None for key in animation.keyframes)
     ]
+
+
+def _is_upright(camera: Camera) -> bool:
+    x, y, z = camera.up
+    return x == z == 0 and y > 0
 
 
 def _view_problems(camera: Camera, animation: Animation) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from .axes_and_units import Axis, LightUnit, Unit
 from .cameras import Camera as Camera
 from .fields.field_types import show
 from .fields.group_name import GroupName
-from .fields.limits import Gt
+from .fields.limits import Ge, Gt, Le
 from .fields.number_arrays import real_array, whole_array
 from .fields.pixels import image_faults
 from .fields.validated import Editable, KnownFields, Validated
@@ -32,6 +32,9 @@ Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]
+Fraction = Annotated[float, Ge(0), Le(1)]
+#: View transforms without a config of their own, see output/view_transform.py.
+ViewName = Literal["srgb", "agx", "pbr_neutral", "reinhard", "aces", "raw"]
 
 
 @dataclass(eq=False)
@@ -212,6 +215,26 @@ class Backdrop(Editable):
         return image_faults(self.image, self.color)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Ground(Validated):
+    """Diffuse square floor that catches the shadow of the scene, in images of light (see on_ground.on_ground).
+
+    height: its y; center: x and z of its middle; radius: half its side; color: its albedo.
+    """
+
+    height: float = 0.0
+    center: tuple[float, float] = (0.0, 0.0)
+    radius: Positive = 1.0
+    color: tuple[Fraction, Fraction, Fraction] = (0.5, 0.5, 0.5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Display(Validated):
+    """How images of the scene are shown. view: their view transform, unless another is chosen (docs/colour.md)."""
+
+    view: ViewName = "srgb"
+
+
 @dataclass(eq=False)
 class Origin:
     """A [[mesh]] or [[instance]] table, with the file's absolute path. parts: what it showed; own: the materials of
@@ -258,6 +281,7 @@ class Scene(KnownFields):
 
     - camera: the one to render; cameras: others by name, including those of model files.
     - backdrop: what the camera sees behind the scene, if not the environment.
+    - ground: what the scene stands on, in images of light only; display: how these are shown.
     - animation: how the camera and models move.
     - materials: the scene file's named ones; meshes and spheres refer to these objects.
     - source: the files that its parts were read from, if any.
@@ -279,6 +303,8 @@ class Scene(KnownFields):
     materials: dict[str, Material] = field(default_factory=dict)
     source: Source | None = None
     backdrop: Backdrop | None = None
+    ground: Ground | None = None
+    display: Display = field(default_factory=Display)
 
     def __post_init__(self) -> None:
         from .validation.validate import validate  # which knows all parts of a scene

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from ..option_fields import option
-from .fields.limits import Ge, Le, Lt
+from .fields.limits import Ge, Gt, Le, Lt
 from .fields.validated import Validated
 
 Pixels = Annotated[int, Ge(1), Le(65536)]
@@ -23,6 +23,8 @@ class RenderSettings(Validated):
     """Default render settings of a scene.
 
     - size: (width, height) in pixels
+    - spp, error: the samples per pixel, and the estimated error (root of relMSE) at which fewer are enough, after which
+      a render without other stop conditions stops
     - max_depth: maximum path depth: 1 emission only, 2 direct light, 3 one bounce
     - shadows: whether the integrators local and raster cast shadow rays
     - back_face_culling: which rays ignore the back faces of materials that are not double_sided: "none", those of the
@@ -35,6 +37,7 @@ class RenderSettings(Validated):
 
     size: tuple[Pixels, Pixels] = option((512, 512), "Image size in pixels.")
     spp: Annotated[int, Ge(1)] = option(64, "Samples per pixel.")
+    error: Annotated[float, Gt(0)] | None = None
     max_depth: Annotated[int, Ge(1), Le(1024)] = option(
         8, "Maximum path depth: 1 emission only, 2 direct light, 3 one bounce."
     )

@@ -84,7 +84,7 @@ def test_frames_of_an_animated_model(tmp_path: Path, monkeypatch: pytest.MonkeyP
     gltf = animated()
     gltf.document["scenes"][0]["nodes"] += gltf.document["nodes"][0].pop("children")  # a camera that stands still
     gltf.write(Path("a.glb"))
-    small = "a.glb", "--size", "16x16", "--spp", "2", "--depth", "2"
+    small = "a.glb", "--size", "16x16", "--spp", "2", "--depth", "2", "--look", "sky"
     asked = *small, "--animation", "walk", "--frames", "0,2,4", "--fps", "2"
     written = [f"f_{number}.exr" for number in (0, 2, 4)]
     assert render(*asked, "-o", "f_#.exr") == written

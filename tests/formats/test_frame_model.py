@@ -104,8 +104,8 @@ def wedge(path: Path, turn: Matrix) -> Path:
 def test_a_named_view_shows_the_model_as_if_it_were_turned(view: str, degrees: float, tmp_path: Path) -> None:
     """Camera and sun are turned together, so the view equals the default one of a model turned the other way."""
     turn = rotation((0.0, degrees, 0.0))
-    seen = load(wedge(tmp_path / "a.obj", np.eye(4)), view)
-    turned = load(wedge(tmp_path / "b.obj", turn.T))
+    seen = load(wedge(tmp_path / "a.obj", np.eye(4)), view, look="sky")
+    turned = load(wedge(tmp_path / "b.obj", turn.T), look="sky")
     for own, other in [(seen.camera.position, turned.camera.position), (seen.camera.look_at, turned.camera.look_at)]:
         np.testing.assert_allclose(own, turn[:3, :3] @ other, atol=1e-6)
     (sun,) = seen.lights

@@ -179,6 +179,7 @@ def test_scenes_by_name(tmp_path: Path) -> None:
         "variants": [],
         "extensions": [],
         "left_out": [],
+        "look": ["studio"],
     }
     with pytest.raises(SceneError, match=r'a.glb: scene: "fr" is unknown; use one of "scene 0", "far", "0"'):
         clrt.load(path, scene="fr")

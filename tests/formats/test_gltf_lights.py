@@ -16,6 +16,7 @@ from clrt.output.scenes import save_scene
 from clrt.scene.axes_and_units import LightUnit
 from clrt.scene.default_sky import SUN
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
+from clrt.scene.studio import KEY
 
 from .glb import Gltf
 
@@ -166,8 +167,9 @@ def test_units_of_scene_files(tmp_path: Path, caplog: pytest.LogCaptureFixture) 
         load(scene)
 
 
-def test_models_without_lights_have_the_sun(tmp_path: Path) -> None:
-    assert load(lit({"type": "point"}).write(tmp_path / "dark.glb")).lights == [SUN]
+def test_models_without_lights_have_those_of_the_look(tmp_path: Path) -> None:
+    dark = lit({"type": "point"}).write(tmp_path / "dark.glb")
+    assert load(dark, look="sky").lights == [SUN] and load(dark).lights == [KEY]
 
 
 def test_cones_of_one_width_are_sharp(tmp_path: Path) -> None:

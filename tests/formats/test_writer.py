@@ -104,7 +104,7 @@ def test_some_of_a_file_s_materials_are_replaced(tmp_path: Path) -> None:
     with pytest.raises(SceneError) as caught:
         load(scene)
     assert caught.value.problems == [
-        f'{scene}: environment.sky: 1 is unknown; write "default"',
+        f"{scene}: environment.sky: 1 is unknown; write one of default, studio",
         f"{scene}: environment: has both a sky and color; keep one of them",
         f'{scene}: mesh[0].materials: 3 is not a table; write {{ "name in the file" = "NAME" }}',
     ]

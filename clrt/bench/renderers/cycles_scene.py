@@ -21,6 +21,7 @@ from ...scene.lights import DirectionalLight, GoniometricLight, PointLight, Proj
 from ...scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ...scene.materials.textures import untextured
 from ...scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from ...scene.on_ground import on_ground
 from ..rays.hard_meshes import icosphere
 from .camera_visibility import check_seen_as_lit
 
@@ -63,6 +64,7 @@ def check_scene(scene: Scene) -> None:
 
 def blender_scene(data: Any, scene: Scene, folder: Path, bsdfs: Mapping[type[Material], Bsdf] | None = None) -> Any:
     """Add the scene to `data` (bpy.data); images are written to `folder`. bsdfs: used instead of BSDFS."""
+    scene = on_ground(scene)
     made = data.scenes.new(scene.name)
     set_up(made, scene.render)
     bsdfs = bsdfs or BSDFS

@@ -21,6 +21,7 @@ from ...scene.lights import DirectionalLight, GoniometricLight, Light, PointLigh
 from ...scene.materials.material_types import Dielectric
 from ...scene.materials.textures import Texture
 from ...scene.model import Camera, Environment, Mesh, Scene, Sphere
+from ...scene.on_ground import on_ground
 from .camera_visibility import check_seen_as_lit
 from .mitsuba_bsdfs import Plugin, bsdf, color, medium, rgb
 
@@ -36,6 +37,7 @@ SUN_DEGREES = 90
 
 def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
     """Return the plugins of `scene` with its own settings. Raises UsageError for an unsupported feature."""
+    scene = on_ground(scene)
     if scene.render.filter == "blackman_harris":
         raise UsageError(f"{scene.name}: Mitsuba has no such filter; write filter = box, tent or gaussian")
     if scene.render.integrator not in ("path", "direct"):

@@ -10,19 +10,33 @@ from typing import Any, TypeVar
 
 from ...errors import ObjectError, SceneError
 from ...scene.animation import Animation, Keyframe, SceneAnimation
-from ...scene.default_sky import SUN, default_sky
+from ...scene.default_sky import SUN
 from ...scene.fields.field_types import field_problems, show, unknown, usable
 from ...scene.fields.validated import read_only
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.lights import LIGHTS, Light
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
 from ...scene.materials.textures import WHITE, Texture
-from ...scene.model import Backdrop, Camera, Environment, Instance, Model, Origin, RenderSettings, Scene, Source, Sphere
+from ...scene.model import (
+    Backdrop,
+    Camera,
+    Display,
+    Environment,
+    Ground,
+    Instance,
+    Model,
+    Origin,
+    RenderSettings,
+    Scene,
+    Source,
+    Sphere,
+)
 from ...scene.model_pose import with_poses
 from ...scene.provenance import material_of, parts_of
 from ...scene.sky.sky import Sky
 from ..images.image_reader import read_picture
 from ..referenced_files import name_of
+from .built_in_environments import BUILT_IN
 from .instance_table import InstanceReader, InstanceTable, Repeat, placed
 from .mesh_table import MeshTable
 from .moving_mesh import MovingMesh, shown
@@ -40,6 +54,8 @@ SECTIONS = (
     "environment",
     "sky",
     "backdrop",
+    "ground",
+    "display",
     "materials",
     "mesh",
     "instance",
@@ -72,6 +88,8 @@ class SceneReader:
         sky = self._sky()
         environment = sky.environment() if sky else self._environment(self._table("environment"))
         backdrop = self._backdrop(self._table("backdrop")) if "backdrop" in self._document else None
+        ground = self._build(Ground, self._table("ground"), "ground") if "ground" in self._document else None
+        display = self._build(Display, self._table("display"), "display")
         for name, values in self._table("materials").items():
             where = f"materials.{name}"
             self._materials[name] = self._typed(MATERIALS, values, where) or Diffuse()
@@ -100,6 +118,8 @@ class SceneReader:
                 cameras=self._cameras,
                 environment=environment or Environment(),
                 backdrop=backdrop,
+                ground=ground,
+                display=display or Display(),
                 render=render or RenderSettings(),
                 name=name_of(self._path),
                 animation=animation,
@@ -225,9 +245,10 @@ class SceneReader:
     def _environment(self, values: Table) -> Environment | None:
         values, image = dict(values), None
         if (sky := values.pop("sky", None)) is not None:
-            image = default_sky().image
-            if sky != "default":
-                self.problems.append(f'environment.sky: {show(sky)} is unknown; write "default"')
+            if str(sky) in BUILT_IN:
+                image = BUILT_IN[str(sky)]().image
+            else:
+                self.problems.append(f"environment.sky: {show(sky)} {unknown(sky, BUILT_IN)}")
             self.problems += [
                 f"environment: has both a sky and {key}; keep one of them"
                 for key in ("color", "image")

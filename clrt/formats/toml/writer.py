@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scene.animation import Animation, SceneAnimation
-from ...scene.default_sky import default_sky
 from ...scene.editing import free_name, materials_of
 from ...scene.fields.field_types import plain_value
 from ...scene.geometry.instancing import meshes_by_id
@@ -25,10 +24,11 @@ from ...scene.light_images import LightImage
 from ...scene.materials.material import Material
 from ...scene.materials.material_types import Diffuse
 from ...scene.materials.textures import Picture, Texture
-from ...scene.model import Backdrop, Environment, Instance, Mesh, Origin, Scene, Source
+from ...scene.model import Backdrop, Display, Environment, Instance, Mesh, Origin, Scene, Source
 from ...scene.provenance import material_of, shape_of
 from ...scene.sky.sky import Sky, SkyEnvironment
 from ..gltf.glb_writer import mesh_glb
+from .built_in_environments import built_in_name
 from .texture_table import LightImageTable, TextureTable
 from .values import is_plain, toml_key, toml_value
 
@@ -122,6 +122,8 @@ class _Writer:
         sky = _sky_of(scene)
         head += self._section("[sky]", sky) if sky else self._environment(scene.environment)
         head += self._backdrop(scene.backdrop) if scene.backdrop else ()
+        head += self._section("[ground]", scene.ground) if scene.ground else ()
+        head += self._section("[display]", scene.display) if scene.display != Display() else ()
         for light in scene.lights[len(sky.lights()) if sky else 0 :]:
             if id(light) not in self._moving:
                 head += self._section("[[light]]", light, light.kernel)
@@ -154,10 +156,9 @@ class _Writer:
 
     def _environment(self, sky: Environment) -> Iterator[str]:
         yield from self._colored("[environment]", sky)
-        if sky.image is not None and self._source.file_of(sky.image) is None and _is_default(sky.image):
-            yield 'sky = "default"'
-        elif sky.image is not None:
-            yield self._image(sky.image, "sky")
+        if sky.image is not None:
+            name = built_in_name(sky.image) if self._source.file_of(sky.image) is None else None
+            yield f"sky = {toml_value(name)}" if name else self._image(sky.image, "sky")
 
     def _backdrop(self, backdrop: Backdrop) -> Iterator[str]:
         yield from self._colored("[backdrop]", backdrop)
@@ -390,11 +391,6 @@ def _given(kind: type, record: Texture | LightImage) -> dict[str, Any]:
 def _moves(table: Mapping[str, Any]) -> bool:
     """Return whether the model of a [[mesh]] table moves."""
     return "animation" in table and "time" not in table
-
-
-def _is_default(image: NDArray[np.float32]) -> bool:
-    default = default_sky().image
-    return default is not None and np.array_equal(image, default)
 
 
 def _is_plain(material: Material) -> bool:

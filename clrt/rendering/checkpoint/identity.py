@@ -24,7 +24,7 @@ from ..compile.choices import Choices
 from ..compile.visible_parts import visible_parts
 
 #: Fields excluded from a scene's settings, from Choices, and from everything in a scene.
-ENDS = {"spp"}
+ENDS = {"spp", "error"}
 ROUNDING = {"lanes", "layout", "builder", "paths", "tree", "first_hits"}
 NAMES = {"name", "material_name"}
 #: Folders whose Python code determines samples: how scenes are packed, what is sampled and summed. (What the readers

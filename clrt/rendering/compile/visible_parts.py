@@ -7,7 +7,7 @@ from dataclasses import fields
 from ...scene.model import Scene
 
 #: Fields of a Scene that are no part of it: names, settings, and what is rendered only when it is chosen.
-UNSEEN = {"name", "render", "cameras", "animation", "materials", "source"}
+UNSEEN = {"name", "render", "cameras", "animation", "materials", "source", "display"}
 
 
 def visible_parts(scene: Scene) -> list[str]:

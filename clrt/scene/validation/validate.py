@@ -15,7 +15,7 @@ from ..fields.field_types import show
 from ..fields.validated import Validated
 from ..lights import LIGHTS, BaseLight
 from ..materials.material_types import MATERIALS, Material
-from ..model import Backdrop, Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
+from ..model import Backdrop, Camera, Display, Environment, Ground, Instance, Mesh, RenderSettings, Scene, Sphere
 
 #: Lists of a scene by field: what an entry is called, and its type.
 LISTS: dict[str, tuple[str, type[Validated]]] = {
@@ -25,7 +25,14 @@ LISTS: dict[str, tuple[str, type[Validated]]] = {
     "lights": ("light", BaseLight),
 }
 #: Single parts of a scene by field, likewise.
-PARTS: dict[str, type[Validated]] = {"camera": Camera, "environment": Environment, "render": RenderSettings}
+PARTS: dict[str, type[Validated]] = {
+    "camera": Camera,
+    "environment": Environment,
+    "render": RenderSettings,
+    "display": Display,
+}
+#: Parts that a scene may lack.
+OPTIONAL: dict[str, type[Validated]] = {"backdrop": Backdrop, "ground": Ground}
 #: Concrete types of the abstract ones.
 KINDS: dict[type, tuple[type, ...]] = {Material: MATERIALS, BaseLight: LIGHTS}
 
@@ -50,7 +57,8 @@ def scene_problems(scene: Scene) -> list[str]:
     if problems := _list_problems(scene):
         return problems
     problems = [problem for name, kind in PARTS.items() for problem in _problems(getattr(scene, name), kind, name)]
-    problems += [] if scene.backdrop is None else _problems(scene.backdrop, Backdrop, "backdrop")
+    for name, kind in OPTIONAL.items():
+        problems += [] if getattr(scene, name) is None else _problems(getattr(scene, name), kind, name)
     for field, (name, kind) in LISTS.items():
         for i, part in enumerate(getattr(scene, field)):
             problems += _problems(part, kind, f"{name}[{i}]")
