@@ -83,3 +83,12 @@ def test_single_precision_is_enough_around_a_pixel(bright: float, samples: int) 
     for y, x in np.ndindex(found.shape[:2]):
         each, its_own = one_by_one(mean, variance, y + REACH, x + REACH, 0), (y + REACH, x + REACH) == (10, 12)
         assert found[y, x, 0] == pytest.approx(each, rel=PRECISION, abs=4e-16 * bright * its_own)
+
+
+def test_differences_far_below_the_noise_are_chance() -> None:
+    """Between almost equal windows the ratio of variance to squared difference exceeds float32: no warning, which
+    would be an error here, and the mean of the windows."""
+    mean = np.full((20, 20, 3), 0.35)
+    mean[9:12, 9:12] += 1e-7
+    near = expected(mean, np.full(mean.shape, 1e30))
+    np.testing.assert_allclose(near, 0.35, rtol=1e-5)

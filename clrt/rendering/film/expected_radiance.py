@@ -62,6 +62,6 @@ def _beside(values: Floats, reach: int) -> Floats:
 
 def _towards(start: Floats, end: Floats, variance: Floats) -> Any:
     """Shrink `end`, of known variance, towards `start`; return `start` where the variance is NaN."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         by_chance = np.fmin(variance / (end - start) ** 2, 1)
     return by_chance * start + (1 - by_chance) * end
