@@ -17,11 +17,11 @@ from typing import Any, get_args
 from ..errors import SceneError, UsageError, check_choice
 from ..file_names import StrPath
 from ..scene.axes_and_units import CONVERTED, Axis, Unit
+from ..scene.fields.field_types import field_problems
 from ..scene.geometry.transform import rotation, translation
 from ..scene.model import Instance, Mesh, Model, RenderSettings, Scene
 from ..scene.model_pose import with_poses
 from ..scene.provenance import source_of_model
-from ..scene.fields.field_types import field_problems
 from ..scene.validation.validate import scene_problems
 from .frame_model import VIEWS, frame
 from .model_choice import DEFAULT, ModelChoice
