@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from .rendering.views import each_view as each_view, render_views as render_views
     from .scene.animation import Animation as Animation, Keyframe as Keyframe
     from .scene.camera_path import frames as frames, turntable as turntable
+    from .scene.cameras import CameraEnd as CameraEnd
     from .scene.light_images import LightImage as LightImage
     from .scene.lights import (
         DirectionalLight as DirectionalLight,
@@ -112,6 +113,7 @@ _HOME = {
     "rendering.views": ("each_view", "render_views"),
     "scene.animation": ("Animation", "Keyframe"),
     "scene.camera_path": ("frames", "turntable"),
+    "scene.cameras": ("CameraEnd",),
     "scene.light_images": ("LightImage",),
     "scene.lights": ("DirectionalLight", "GoniometricLight", "PointLight", "ProjectorLight", "SpotLight"),
     "scene.materials.material_types": (

@@ -82,11 +82,17 @@ def tree_features(triangles: bool, spheres: bool, lone: bool = False, rays: bool
 
 
 def tree_files(
-    layout: str, tests: HitTests, triangles: bool, spheres: bool, lone: bool = False, instances: bool = False
+    layout: str,
+    tests: HitTests,
+    triangles: bool,
+    spheres: bool,
+    lone: bool = False,
+    instances: bool = False,
+    motion: bool = False,
 ) -> dict[str, list[str]]:
     """Return the files for the includes of kernels/traverse, for a scene with triangles, spheres or neither.
 
-    layout: one of TREES, or that of NO_RAYS.
+    layout: one of TREES, or that of NO_RAYS. motion: whether instances move.
     """
     sphere_test = [SPHERE_TESTS[tests.sphere]] if spheres else []
     if layout == NO_RAYS.name:
@@ -98,5 +104,6 @@ def tree_files(
         "BOX_TEST": [BOX_TESTS[tests.box]],
         "TRIANGLE_TEST": [triangle_test] if triangles else [],
         "UPPER_LEVEL": [UPPER_LEVELS[layout]] if instances else [],
+        "MOTION_FILE": ["geometry/motion.cl"] if motion else [],
         "SPHERE_TEST": sphere_test,
     }

@@ -7,7 +7,7 @@ one.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import Any
@@ -32,6 +32,8 @@ INSTANCE = record(to_object="(3,4)f4", root="i4", index="i4", pad="2i4")
 #: Relative rounding error of transforming a coordinate to object space and back: three products, their sum, the matrix
 #: itself.
 TRANSFORM_ROUNDING = 8 * 2.0**-24
+#: World boxes, aabb_min and aabb_max (m, 3), that contain boxes (m, 2, 3) of moving instances in all their poses.
+Sweep = Callable[[Doubles], tuple[FloatArray, FloatArray]]
 
 
 class TwoLevelBvh:
@@ -77,13 +79,17 @@ class TwoLevelBvh:
         other._device, other._buffers = device, buffers
         return other
 
-    def place(self, to_world: Doubles) -> Layout:
+    def place(self, to_world: Doubles, moving: IntArray | None = None, sweep: Sweep | None = None) -> Layout:
         """Return the BVH with the instances placed by object-to-world transforms (k, 3, 4), none singular.
 
         Its buffers are those of the previous BVH, overwritten. build_seconds: of the lower level and this upper one.
+        moving: (m,), numbers of instances that move; sweep: of their boxes.
         """
         start = time.perf_counter()
-        upper, order = upper_level(self._form, *world_boxes(self._boxes[self._mesh], to_world))
+        low, high = world_boxes(self._boxes[self._mesh], to_world)
+        if moving is not None and sweep is not None:
+            low[moving], high[moving] = sweep(self._boxes[self._mesh[moving]])
+        upper, order = upper_level(self._form, low, high)
         instances = np.zeros(len(order), INSTANCE)
         instances["to_object"], instances["index"] = inverse(to_world)[order], order
         instances["root"] = self._roots[self._mesh[order]]

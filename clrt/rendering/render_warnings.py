@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from ..scene.exposure import is_moving
 from ..scene.model import RenderSettings, Scene
 from ..scene.validation.winding import backward_emitters
 from .compile.features import INTEGRATORS, WITH_LIGHT, biased_by
@@ -41,6 +42,17 @@ def bias_warnings(settings: RenderSettings, removed: float) -> list[str]:
     ]
 
 
+def motion_warnings(scene: Scene) -> list[str]:
+    """Return one warning if something has a motion that the exposure is too short for, else none."""
+    given = scene.camera.end is not None or any(map(is_moving, scene.instances))
+    if scene.camera.exposure > 0 or not given:
+        return []
+    return [
+        "what moves is not blurred, as the camera's exposure takes 0 seconds; write shutter = [0, 0.02] or such in "
+        "[camera]"
+    ]
+
+
 def black_warnings(settings: RenderSettings, features: Iterable[str], brightest: float, cause: str) -> list[str]:
     """Return one warning if an image of light is black although something emits: its brightest value is below BLACK.
     cause: the likely cause if that value is 0. An image of catchers may have shadows alone."""
@@ -69,6 +81,7 @@ class PictureWarnings:
         ]
         if _shows_light(scene.render) and _is_dark(self._features):
             self._of_scene.append("the image is black: nothing in this scene emits light")
+        self._of_scene += motion_warnings(scene)
         if "CATCHER" in self._features and not scene.render.transparent and scene.backdrop is None:
             self._of_scene.append(
                 "what catchers catch is not visible on black; add transparent = true to [render], or a [backdrop]"

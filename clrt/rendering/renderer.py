@@ -14,6 +14,7 @@ from ..awake import AwakeClock, watched_clock
 from ..device.open import Selectors, name_of, open_devices
 from ..errors import DeviceError
 from ..float_errors import with_default_errors
+from ..scene.exposure import motion_features
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.on_ground import is_below, on_ground
 from ..scene.validation.validate import check_is_scene, validate
@@ -135,13 +136,14 @@ class Renderer:
     def look(self, camera: Camera) -> None:
         """Start a new image from this camera, bit-identical to the one that a new renderer would produce.
 
-        BVH and buffers are reused; so is the program, unless the camera model changes (projection, lens). Raises
-        SceneError if the camera is invalid, and UsageError if a checkpoint is written, as it belongs to one image.
+        BVH and buffers are reused; so is the program, unless the camera model changes (projection, lens, motion).
+        Raises SceneError if the camera is invalid, and UsageError if a checkpoint is written, as it belongs to one
+        image.
         """
         check_of_none(self._checkpoints)
         validate(Scene(camera=camera, render=self.settings))
         seen = replace(self.given, camera=camera)
-        if is_below(seen) != is_below(self.given):  # the ground is another
+        if not self._stays(seen):
             self.show(seen)
             return
         with self._turns.one():
@@ -157,7 +159,7 @@ class Renderer:
         """
         check_of_none(self._checkpoints)
         check_is_scene(scene)
-        if same_world(scene, self.given) and is_below(scene) == is_below(self.given):
+        if same_world(scene, self.given) and self._stays(scene):
             self.look(scene.camera)
             return
         self.given = replace(scene, render=self.settings)
@@ -165,6 +167,10 @@ class Renderer:
             self._show(on_ground(self.given))
             self._asked_for = None
             self._begin()
+
+    def _stays(self, scene: Scene) -> bool:
+        """Return whether the ground and what moves are those of the scene shown, for a scene with another camera."""
+        return is_below(scene) == is_below(self.given) and motion_features(scene) == motion_features(self.given)
 
     def _show(self, scene: Scene) -> None:
         self._compiled, self.scene = self._compiler.compile(scene, self.choices), scene

@@ -14,6 +14,7 @@ from ..device.open import Selectors
 from ..errors import SceneError, UsageError, did_you_mean
 from ..float_errors import with_default_errors
 from ..scene.cameras import CALIBRATED
+from ..scene.exposure import motion_features
 from ..scene.model import Camera, Scene
 from ..scene.view import View
 from .aovs import AOVS
@@ -48,8 +49,9 @@ def each_view(
     names of AOVs (docs/aovs.md), with "light_groups" a layer of each group, "instance_id" and "material_id" being
     "object" and "material"; "flow", 2 channels: how far to the right and down, in pixels, the next view shows the point
     at the pixel's center, NaN where nothing is hit, or where that view's lens does not image it, and in the last view.
-    Without "rgb" and AOVs of light, no light is computed. Raises UsageError for other layers, or for flow between
-    cameras neither perspective nor fisheye, SceneError for a camera that cannot be used, and what `render` raises.
+    Without "rgb" and AOVs of light, no light is computed. Raises UsageError for other layers, or for flow with motion
+    blur or between cameras neither perspective nor fisheye, SceneError for a camera that cannot be used, and what
+    `render` raises.
     """
     names = _chosen(layers)
     aovs = {IDS.get(name, name): None for name in names if name not in ("rgb", "alpha", "flow")}
@@ -62,6 +64,8 @@ def each_view(
         given["transparent"] = True
     renderer = None
     for number, (camera, following) in enumerate(_with_next(cameras)):
+        if "flow" in names and motion_features(replace(scene, camera=camera)):
+            raise UsageError(f"view {number} has motion blur, which flow is not defined for; leave flow or shutter out")
         try:
             if renderer is None:
                 renderer = Renderer(replace(scene, camera=camera), **given)

@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import UsageError
+from ..errors import ObjectError, UsageError
 from .animation import Positive, Vector
 from .camera_matrices import Convention, coefficients_of, intrinsics_of, pose_of, world_to_camera_of
 from .fields.field_types import show
@@ -24,6 +24,25 @@ from .materials.textures import NonNegative
 Doubles = NDArray[np.float64]
 Calibrated = Literal["perspective", "fisheye"]
 Projection = Literal["perspective", "orthographic", "equirectangular", "fisheye"]
+#: Lengths that a camera may have.
+OPTIONAL_LENGTHS = ("focus_distance", "view_height")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraEnd(Validated):
+    """Fields of a camera (see `Camera`) at the end of the exposure; None for those that do not change."""
+
+    position: Vector | None = None
+    look_at: Vector | None = None
+    up: Vector | None = None
+    fov_degrees: Annotated[float, Gt(0), Lt(180)] | None = None
+    focus_distance: Positive | None = None
+    view_height: Positive | None = None
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """The fields that change."""
+        return {field.name: value for field in fields(self) if (value := getattr(self, field.name)) is not None}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,6 +63,10 @@ class Camera(Validated):
       model; `lens_shift`, `pixel_aspect` and `skew` as above.
 
     A pixel that a lens with distortion does not image, beyond the radius where the model folds back, is black.
+
+    Exposure: `shutter`, the seconds at which the shutter opens and closes, relative to the frame's time in an
+    animation; `rolling_shutter`, the seconds by which it does so later for the last row than for the first; `end`, the
+    camera at the end of the exposure, at shutter[1] + rolling_shutter. Nothing moves in an exposure of 0 seconds.
     """
 
     position: Vector = (0.0, 0.0, 5.0)
@@ -59,6 +82,9 @@ class Camera(Validated):
     skew: float = 0.0
     distortion: tuple[float, ...] = ()
     fisheye_degrees: Positive = 180.0
+    shutter: tuple[float, float] = (0.0, 0.0)
+    rolling_shutter: NonNegative = 0.0
+    end: CameraEnd | None = None
 
     @classmethod
     def from_matrix(
@@ -139,11 +165,46 @@ class Camera(Validated):
                 f"distortion: {show(self.distortion)} has {len(self.distortion)} entries; write "
                 f'{" or ".join(map(str, counts))} with projection = "{self.projection}": {order}'
             ]
-        return [
+        if self.shutter[1] < self.shutter[0]:
+            return [f"shutter: {show(self.shutter)} closes before it opens; write the earlier time first"]
+        return self._faults_at_end() or [
             f'{name}: {show(getattr(self, name))} has no effect with projection = "{self.projection}"; leave it out'
             for name, default in self.unread_fields().items()
             if getattr(self, name) != default
         ]
+
+    def _faults_at_end(self) -> list[str]:
+        if self.end is not None:
+            try:
+                self.at_end.check()
+            except ObjectError as error:  # of making it
+                return [f"end{fault}" for fault in error.faults]
+        return []
+
+    @property
+    def exposure(self) -> float:
+        """The seconds from the first row's opening to the last row's closing."""
+        return self.shutter[1] - self.shutter[0] + self.rolling_shutter
+
+    @property
+    def at_end(self) -> Camera:
+        """The camera at the end of the exposure."""
+        return replace(self, end=None, **self.end.changes) if self.end else self
+
+    def exposed_as(self, other: Camera) -> Camera:
+        """Return another camera with this one's shutter and rolling shutter; the other itself if it has these."""
+        if (other.shutter, other.rolling_shutter) == (self.shutter, self.rolling_shutter):
+            return other
+        return replace(other, shutter=self.shutter, rolling_shutter=self.rolling_shutter)
+
+    def moving_to(self, end: Camera) -> Camera:
+        """Return the camera moving to where another one is, and to its field of view, during the exposure."""
+        return replace(self, end=CameraEnd(**{field.name: getattr(end, field.name) for field in fields(CameraEnd)}))
+
+    @property
+    def moves(self) -> bool:
+        """Whether it moves during the exposure."""
+        return self.exposure > 0 and self.at_end != replace(self, end=None)
 
     @property
     def type(self) -> type[CameraType]:
@@ -154,13 +215,17 @@ class Camera(Validated):
 
     def scaled(self, factor: float) -> Camera:
         """Return the camera at the same place with its own lengths multiplied by `factor`."""
-        focus, height = (length and length * factor for length in (self.focus_distance, self.view_height))
-        return replace(self, aperture_radius=self.aperture_radius * factor, focus_distance=focus, view_height=height)
+        end = self.end and replace(self.end, **_scaled(self.end, factor))
+        return replace(self, aperture_radius=self.aperture_radius * factor, end=end, **_scaled(self, factor))
 
     def unread_fields(self) -> dict[str, Any]:
         """Return the fields that only other camera types read, and their defaults."""
         others = frozenset().union(*(kind.reads for kind in CAMERA_TYPES.values())) - self.type.reads
         return {field.name: field.default for field in fields(self) if field.name in others}
+
+
+def _scaled(lens: Camera | CameraEnd, factor: float) -> dict[str, Any]:
+    return {name: length and length * factor for name, length in vars(lens).items() if name in OPTIONAL_LENGTHS}
 
 
 class View(NamedTuple):

@@ -22,7 +22,7 @@ from .fields.number_arrays import real_array, whole_array
 from .fields.pixels import image_faults
 from .fields.validated import Editable, KnownFields, Validated
 from .geometry.mesh_faults import CORNERS, mesh_faults
-from .geometry.transform_faults import placement_faults
+from .geometry.transform_faults import are_mirrored, placement_faults
 from .lights import Light
 from .materials.material_types import Diffuse, Material
 from .materials.textures import NonNegative
@@ -100,6 +100,10 @@ class Mesh(Editable):
         return self.colors is not None and self.colors.shape[1] == 4 and bool((self.colors[:, 3] < 1).any())
 
 
+#: Matrices of an instance.
+MATRICES = ("to_world", "to_world_end", "pivot")
+
+
 @dataclass(eq=False)
 class Instance(Editable):
     """An instance, which shares its mesh's memory. The mesh itself is rendered only if the scene's `meshes` contain it.
@@ -107,19 +111,23 @@ class Instance(Editable):
     to_world: (3, 4), or (4, 4) with the last row 0, 0, 0, 1: an affine matrix that acts on column vectors and takes the
     mesh's points to the world; it may mirror, but must not be singular. material: replaces the mesh's own. The matrix
     is read-only, as the arrays of `Mesh`; raises SceneError likewise.
+
+    to_world_end: the same at the end of the camera's exposure, if it moves. pivot: likewise, takes the mesh's points to
+    the frame whose origin moves in a straight line and whose axes turn at a constant rate; None for the mesh's own.
     """
 
     mesh: Mesh
     to_world: NDArray[np.float64] = field(default_factory=lambda: np.eye(3, 4))
     material: Material | None = None
     name: str = "instance"
+    to_world_end: NDArray[np.float64] | None = None
+    pivot: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         """Convert numbers to float64 and four rows to three."""
-        with suppress(ValueError, TypeError, OverflowError):
-            matrix = np.asarray(self.to_world, np.float64)
-            affine = matrix.shape == (4, 4) and np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0))
-            self.to_world = matrix[:3] if affine else matrix
+        for name in MATRICES:
+            if (matrix := getattr(self, name)) is not None:
+                setattr(self, name, _three_rows(matrix))
         super().__post_init__()
 
     @property
@@ -129,15 +137,32 @@ class Instance(Editable):
     def faults(self) -> list[str]:
         if faults := super().faults():
             return faults
-        if np.shape(self.to_world) != (3, 4):
+        for name in MATRICES:
+            matrix = getattr(self, name)
+            if matrix is None and name != "to_world":
+                continue
+            if np.shape(matrix) != (3, 4):
+                return [
+                    f": {name} has shape {np.shape(matrix)}; write a numpy array of shape (3, 4), or (4, 4) with the "
+                    "last row 0, 0, 0, 1"
+                ]
+            if faults := placement_faults(matrix, self.mesh.vertices):
+                rows = show(tuple(tuple(row) for row in matrix.tolist()))
+                return [f": {name} {rows} {fault}; repair it" for fault in faults]
+        if self.to_world_end is not None and are_mirrored(self.to_world, self.to_world_end):
             return [
-                f": to_world has shape {np.shape(self.to_world)}; write a numpy array of shape (3, 4), or (4, 4) with "
-                "the last row 0, 0, 0, 1"
+                ": one of to_world and to_world_end mirrors the mesh, which would be flat in between; mirror both or "
+                "neither"
             ]
-        if faults := placement_faults(self.to_world, self.mesh.vertices):
-            matrix = show(tuple(tuple(row) for row in self.to_world.tolist()))
-            return [f": to_world {matrix} {fault}; repair it" for fault in faults]
         return [] if self.material is None else self.mesh.missing_uv(self.material)
+
+
+def _three_rows(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    with suppress(ValueError, TypeError, OverflowError):
+        numbers = np.asarray(matrix, np.float64)
+        affine = numbers.shape == (4, 4) and np.array_equal(numbers[3], (0.0, 0.0, 0.0, 1.0))
+        return numbers[:3] if affine else numbers
+    return matrix
 
 
 @dataclass(eq=False, kw_only=True)

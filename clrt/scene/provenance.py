@@ -39,5 +39,5 @@ def material_of(part: Mesh | Instance) -> Material:
 def shape_of(part: Mesh | Instance) -> tuple[object, ...]:
     """Return a key that is equal for two parts only if they have the same arrays, transform and name."""
     if isinstance(part, Instance):
-        return (part.name, id(part.to_world), *shape_of(part.mesh))
+        return (part.name, id(part.to_world), id(part.to_world_end), *shape_of(part.mesh))
     return (part.name, *(id(getattr(part, name)) for name in ARRAYS))

@@ -25,18 +25,20 @@ def stereo_pair(
     for name, value in (("baseline", baseline), ("converge_at", 1.0 if converge_at is None else converge_at)):
         if not 0 < value < np.inf:
             raise UsageError(f"{name} is {value}; it must be above 0 and finite")
-    right, _, ahead = camera.world_to_camera[:3, :3]
-    left_one, right_one = (_moved(camera, side * baseline / 2 * right) for side in (-1, 1))
+    left_one, right_one = (_moved(camera, side * baseline / 2) for side in (-1, 1))
     if converge_at is None:
         return left_one, right_one
-    target = np.add(camera.position, converge_at * ahead)
+    target = np.add(camera.position, converge_at * camera.world_to_camera[2, :3])
     middle = camera.project(target, size)
     return _shifted(left_one, target, middle, size), _shifted(right_one, target, middle, size)
 
 
-def _moved(camera: Camera, step: np.ndarray) -> Camera:
+def _moved(camera: Camera, distance: float) -> Camera:
+    """Return the camera moved to its right, at the end of the exposure, too."""
+    step = distance * camera.world_to_camera[0, :3]
     position, look_at = (tuple(np.add(point, step).tolist()) for point in (camera.position, camera.look_at))
-    return replace(camera, position=position, look_at=look_at)
+    moved = replace(camera, position=position, look_at=look_at, end=None)
+    return moved.moving_to(_moved(camera.at_end, distance)) if camera.end else moved
 
 
 def _shifted(camera: Camera, target: np.ndarray, place: np.ndarray, size: tuple[int, int]) -> Camera:

@@ -70,6 +70,7 @@ kernel void guides(SCENE_PARAMETERS, global Guide *pixels, global const uint *ti
     Seen sum = {splat(ZERO), splat(ZERO)};
     for (uint s = 0; s < launch.sample_count; ++s) {
         Sampler sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
+        SET_TIME(scene, launch, sampler, own.y)
         CameraRay ray;
         ireal active = own.inside & camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler, &ray);
         Seen seen = seen_along(&scene, ray.origin, ray.direction, active, launch.max_depth, &sampler);

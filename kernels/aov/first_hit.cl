@@ -1,8 +1,8 @@
 // First-hit AOVs for compositing: attributes of the first surface that camera rays hit, without its light.
 //
 // One work-item renders LANES pixels. SEEN_MEANS lists the AOVs averaged over `sample_count` camera rays per pixel,
-// as the image is; SEEN_MIDDLE those taken from the single ray through the pixel centre, with its primitive, because
-// a mean of positions or ids is meaningless. The host writes both lists, according to the AOVs requested. With ONE_SAMPLE
+// as the image is; SEEN_MIDDLE those taken from the single ray through the pixel centre, at the middle of the
+// exposure, with its primitive, because a mean of positions or ids is meaningless. The host writes both lists, according to the AOVs requested. With ONE_SAMPLE
 // that ray is the pixel's sample number first_sample instead. On a miss all values are 0 and the primitive is -1. World
 // frame.
 //
@@ -62,18 +62,21 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
 #define ADD(name) name = add(name, choose(hit, seen_##name(&scene, &surface), splat(ZERO)));
     for (uint s = 0; s < launch.sample_count; ++s) {
         sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
+        SET_TIME(scene, launch, sampler, own.y)
         active = own.inside & camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler, &ray);
         hit = meet(&scene, &ray, active, &sampler, &surface, &other, &other);
         SEEN_MEANS(ADD)
     }
 #if ONE_SAMPLE
     sampler = sampler_at(own.code, (ureal)(launch.first_sample), launch.seed, launch.block_bits);
+    SET_TIME(scene, launch, sampler, own.y)
     active = own.inside & camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler, &ray);
 #else
     real2 middle = {(real)(0.5f), (real)(0.5f)};
     Launch pinhole = launch;
     pinhole.lens_radius = 0.0f;   // use the ray through the centre of a lens as well
     sampler = sampler_at(own.code, (ureal)(0), launch.seed, launch.block_bits);
+    SET_MIDDLE_TIME(scene, launch, own.y)
     active = own.inside & camera_ray(&scene, &pinhole, own.x, own.y, middle, &sampler, &ray);
 #endif
     hit = meet(&scene, &ray, active, &sampler, &surface, &primitive, &instance);

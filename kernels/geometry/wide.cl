@@ -49,6 +49,9 @@ typedef struct {
 #if INSTANCES
     int instance;                              // the instance in whose frame the ray is, or IN_WORLD
 #endif
+#if MOTION
+    float time;                                // see integrator/shutter.cl
+#endif
 } Ray;
 typedef struct {
     float t, u, v;

@@ -14,6 +14,7 @@
 // Each file documents the meaning of launch->right, up and forward; clrt/scene/cameras.py computes them.
 #include "sampler/interface.cl"
 #include "core/vector.cl"
+#include SHUTTER_FILE
 #include FILTER
 
 typedef struct {
@@ -25,6 +26,7 @@ typedef struct {
 } CameraRay;
 
 #include CAMERA
+#include CAMERA_MOTION_FILE
 
 // The coverage of a sample, an argument of what computes its light if the film stores it.
 #if ALPHA
@@ -42,6 +44,24 @@ typedef struct {
 #else
 #define GROUPS_PARAMETER
 #define GROUPS_ARGUMENT(groups)
+#endif
+
+// Set the time of lanes, if the camera or objects move (integrator/shutter.cl): of samples, of the middle of the
+// exposure, and of samples for stages in which only objects move.
+#if TIME
+#define SET_TIME(scene, launch, sampler, y) { \
+        const Sampler timed = sampler; \
+        (scene).time = sample_time(&(launch), &timed, y); \
+    }
+#define SET_MIDDLE_TIME(scene, launch, y) (scene).time = time_of(&(launch), y, (real)(0.5f));
+#else
+#define SET_TIME(scene, launch, sampler, y)
+#define SET_MIDDLE_TIME(scene, launch, y)
+#endif
+#if MOTION
+#define SET_OBJECTS_TIME(scene, launch, sampler, y) SET_TIME(scene, launch, sampler, y)
+#else
+#define SET_OBJECTS_TIME(scene, launch, sampler, y)
 #endif
 
 // Whether a catcher was seen, and the scene of a launch (surface/catcher.cl).
@@ -96,6 +116,20 @@ static inline real2 place_in_pixel(const Scene *scene, const Launch *launch, ure
                    2.0f * (TO_REAL(y) + filter_sample(scene, u.y)) / (float)launch->height - 1.0f};
 }
 
+// The direction of view, unit.
+static inline real3 viewing_direction(const Scene *scene, const Launch *launch) {
+    real3 right = broadcast(launch->right), up = broadcast(launch->up);
+#if CAMERA_MOTION
+    for (int lane = 0; lane < LANES; ++lane) {
+        Launch now = camera_at(launch, LANE(scene->time, lane));
+        ireal own = AS_INT(LANE_INDEX) == lane;
+        right = choose(own, broadcast(now.right), right);
+        up = choose(own, broadcast(now.up), up);
+    }
+#endif
+    return normalize3(cross3(up, right));
+}
+
 // Generate a camera ray through pixel (x, y), filter-sampled by u. Returns the lanes that have one.
 static inline ireal camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u, Sampler *sampler,
                                CameraRay *ray) {
@@ -103,6 +137,10 @@ static inline ireal camera_ray(const Scene *scene, const Launch *launch, ureal x
     return listed_ray(scene, launch, x, y, ray);
 #else
     real2 place = place_in_pixel(scene, launch, x, y, u);
+#if CAMERA_MOTION
+    return ray_through_moving(scene, launch, place.x, place.y, sampler, ray);
+#else
     return ray_through(launch, place.x, place.y, sampler, ray);
+#endif
 #endif
 }

@@ -147,6 +147,7 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
     ireal arrived = number < launch.sample_count;
     ureal x = (ureal)(launch.first_pixel % launch.width), y = (ureal)(launch.first_pixel / launch.width);
     Sampler sampler = sampler_at(pixel_code(x, y), launch.first_sample + number, launch.seed, launch.block_bits);
+    SET_TIME(scene, launch, sampler, y)
     CameraRay ray;   // a sample without one escapes at once
     ireal active = arrived & camera_ray(&scene, &launch, x, y, next_2d(&sampler), &sampler, &ray);
     Path path = path_along(ray.origin, ray.direction);

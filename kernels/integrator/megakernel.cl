@@ -11,7 +11,7 @@
 //                                         `alpha` if ALPHA is; sets `caught` if CATCHER is; adds the light by light
 //                                         group to `groups` if EMITTER_GROUPS is
 //
-// PIXEL_MIDDLE: all samples use the ray through the pixel centre.
+// PIXEL_MIDDLE: all samples use the ray through the pixel centre, at the middle of the exposure.
 #include "integrator/camera_rays.cl"
 #include "film/film.cl"
 #include INTEGRATOR
@@ -26,8 +26,10 @@ kernel void megakernel(SCENE_PARAMETERS, global Pixel *film, global const uint *
     for (uint s = 0; s < launch.sample_count; ++s) {
         Sampler sampler = sampler_at(own.code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
 #if PIXEL_MIDDLE
+        SET_MIDDLE_TIME(scene, launch, own.y)
         real2 place = {(real)(0.5f), (real)(0.5f)};
 #else
+        SET_TIME(scene, launch, sampler, own.y)
         real2 place = next_2d(&sampler);
 #endif
         CameraRay ray;

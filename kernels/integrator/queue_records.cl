@@ -153,6 +153,13 @@ static inline void store_shadow(const Queues *q, uint place, const ShadowRay *ra
     row[3 * q->capacity] = row_of(ray->contribution, 0.0f);
 }
 
+#if MOTION
+// The time of a shadow ray (integrator/shutter.cl).
+static inline global float *shadow_time(const Queues *q, uint place) {
+    return (global float *)(q->shadows + place + 3 * q->capacity) + 3;
+}
+#endif
+
 static inline ShadowRay load_shadow(const Queues *q, uint place, uint *slot) {
     global const float4 *row = q->shadows + place;
     float4 origin = row[0], target = row[q->capacity], wi = row[2 * q->capacity];

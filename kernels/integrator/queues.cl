@@ -28,6 +28,18 @@ static inline Sampler slot_sampler(const Launch *launch, global const uint *tile
     return sampler;
 }
 
+// Set the scene's time to that of a slot, if objects move.
+#define SET_SLOT_TIME(scene, launch, tiles, slot) \
+    SET_OBJECTS_TIME(scene, launch, slot_sampler(&(launch), tiles, slot, 0), slot_row(&(launch), tiles, slot))
+
+#if MOTION
+static inline uint slot_row(const Launch *launch, global const uint *tiles, uint slot) {
+    LanePixels pixel;
+    slot_pixel(launch, tiles, slot, &pixel);
+    return pixel.y;
+}
+#endif
+
 // Stage 1: generate camera rays.
 kernel void generate(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, const Launch launch) {
     local uint group[2];
@@ -40,6 +52,7 @@ kernel void generate(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tile
     if (seen) {
         clear_slot(&q, travel.slot);
         Sampler sampler = slot_sampler(&launch, tiles, travel.slot, 0);
+        SET_TIME(scene, launch, sampler, pixel.y)
         CameraRay ray;
         seen = camera_ray(&scene, &launch, pixel.x, pixel.y, next_2d(&sampler), &sampler, &ray);
         travel.path = path_along(ray.origin, ray.direction);
@@ -58,6 +71,7 @@ kernel void extend(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles,
     EACH_IN_QUEUE(i, *queued_paths(&q, depth)) {
         global float4 *row = path_rows(&q, depth, i);
         float4 origin = row[0], wi = row[q.capacity];
+        SET_SLOT_TIME(scene, launch, tiles, as_uint(origin.w))
 #if OPACITY
         Sampler sampler = slot_sampler(&launch, tiles, as_uint(origin.w), as_uint(wi.w));
         Surface surface;
@@ -135,6 +149,7 @@ kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, 
             Hits hits = load_hits(&q, i);
             shaded.travel = load_path(&q, depth, i);
             ++shaded.travel.rays;
+            SET_SLOT_TIME(scene, launch, tiles, shaded.travel.slot)
             if (hits.primitive < 0) {
                 Path *path = &shaded.travel.path;
                 absorb(path, INFINITY);
@@ -157,6 +172,9 @@ kernel void shade(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles, 
 #if SHADOWS
         uint ray = reserve_if(shaded.sends, queued_shadows(&q, depth), group);
         if (shaded.sends) store_shadow(&q, ray, &shaded.shadow, shaded.travel.slot);
+#if MOTION
+        if (shaded.sends) *shadow_time(&q, ray) = scene.time;
+#endif
         shaded.travel.rays += shaded.sends;
 #endif
         if (used && !shaded.goes) q.rays[shaded.travel.slot] = shaded.travel.rays;
@@ -174,6 +192,9 @@ kernel void connect(SCENE_PARAMETERS, QUEUE_PARAMETERS, const Launch launch, con
     EACH_IN_QUEUE(i, *queued_shadows(&q, depth)) {
         uint slot;
         ShadowRay ray = load_shadow(&q, i, &slot);
+#if MOTION
+        scene.time = *shadow_time(&q, i);
+#endif
         real3 direct = add_light(&q, &launch, slot, light_along(&scene, &ray, true), depth + 1);
 #if EMITTER_GROUPS
         add_group_light(&q, slot, group_of(&scene, ray.light), direct);

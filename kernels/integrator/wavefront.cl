@@ -110,8 +110,12 @@ static inline void add_to_slots(float *row, ureal slot, real found, ireal some) 
 }
 #endif
 
+// Set the scene's time to that of slots, if the camera or objects move.
+#define SET_SLOT_TIME(w, slot) SET_TIME(*scene, *w->launch, slot_sampler(w, slot), slot_y(w, slot))
+#define SET_SLOT_OBJECTS_TIME(w, slot) SET_OBJECTS_TIME(*scene, *w->launch, slot_sampler(w, slot), slot_y(w, slot))
+
 // Stage 1: generate camera rays. Each stage returns the number of paths, or shadow rays, for the next one.
-__attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int slots) {
+__attribute__((noinline)) static int set_out(Scene *scene, Wave *w, int slots) {
     int count = 0;
     uint dimension = 0;
     w->dimension = 0;
@@ -119,6 +123,7 @@ __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int sl
         Travel travel;
         travel.slot = (uint)i + LANE_INDEX;
         Sampler sampler = slot_sampler(w, travel.slot);
+        SET_SLOT_TIME(w, travel.slot)
         CameraRay ray;
         ireal seen = in_picture(w, travel.slot) & camera_ray(scene, w->launch, slot_x(w, travel.slot),
                                                              slot_y(w, travel.slot), next_2d(&sampler), &sampler, &ray);
@@ -148,11 +153,12 @@ __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int sl
 }
 
 // Stage 2: intersect the path segments with the scene.
-__attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int count, int depth) {
+__attribute__((noinline)) static void trace(Scene *scene, Wave *w, int count, int depth) {
     uint dimension = w->dimension;
     for (int i = 0; i < count; i += LANES) {
         Travel travel;
         LOAD(travel, w->arrivals, i)
+        SET_SLOT_OBJECTS_TIME(w, travel.slot)
 #if OPACITY
         Sampler sampler = slot_sampler(w, travel.slot);
         Surface surface;
@@ -204,7 +210,7 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
 
 #if PRIMITIVES
 // Stage 4: at each hit add emission, sample a light (NEE) and sample the BSDF. *sent: the number of shadow rays.
-__attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int count, int depth, int *sent) {
+__attribute__((noinline)) static int shade(Scene *scene, Wave *w, int count, int depth, int *sent) {
     int going = 0;
     uint dimension = w->dimension;
     *sent = 0;
@@ -214,6 +220,7 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
         Path *path = &a.travel.path;
         ireal active = lanes_of(i, count);
         a.hits.primitive = active ? a.hits.primitive : (ireal)(-1);
+        SET_SLOT_OBJECTS_TIME(w, a.travel.slot)
         Surface surface = surface_at(scene, path->origin, path->wi, &a.hits);
 #if CATCHER
         if (depth == 1) {
@@ -256,10 +263,11 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
 
 #if SHADOWS
 // Stage 5: trace the shadow rays and add the direct light of those that are unoccluded.
-__attribute__((noinline)) static void trace_shadows(const Scene *scene, Wave *w, int count, int depth) {
+__attribute__((noinline)) static void trace_shadows(Scene *scene, Wave *w, int count, int depth) {
     for (int i = 0; i < count; i += LANES) {
         Shadow shadow;
         LOAD(shadow, w->shadows, i)
+        SET_SLOT_OBJECTS_TIME(w, shadow.slot)
         real3 light = add_light(w, shadow.slot, light_along(scene, &shadow.ray, lanes_of(i, count)), depth + 1);
 #if EMITTER_GROUPS
         add_group_light(w, shadow.slot, group_of(scene, shadow.ray.light), light);

@@ -17,6 +17,27 @@ static inline real3 placed_normal(const Place *place, real3 n) {
     return scale(normalize3(world), place->side);
 }
 
+#if MOTION
+// Set the matrices of the lanes whose instances move; motion: their numbers, or −1.
+static inline void place_moving(const Scene *scene, ireal motion, Place *place) {
+    RealLanes rows[3][4] = {{{place->x.x}, {place->x.y}, {place->x.z}, {place->moved.x}},
+                            {{place->y.x}, {place->y.y}, {place->y.z}, {place->moved.y}},
+                            {{place->z.x}, {place->z.y}, {place->z.z}, {place->moved.z}}};
+    for (int lane = 0; lane < LANES; ++lane) {
+        int number = LANE_INT(motion, lane);
+        if (number < 0) continue;
+        float pose[3][4];
+        pose_at(RECORD(scene->motions, number), LANE(scene->time, lane), pose);
+        for (int row = 0; row < 3; ++row)
+            for (int column = 0; column < 4; ++column) rows[row][column].lane[lane] = pose[row][column];
+    }
+    place->x = vector(rows[0][0].all, rows[0][1].all, rows[0][2].all);
+    place->y = vector(rows[1][0].all, rows[1][1].all, rows[1][2].all);
+    place->z = vector(rows[2][0].all, rows[2][1].all, rows[2][2].all);
+    place->moved = vector(rows[0][3].all, rows[1][3].all, rows[2][3].all);
+}
+#endif
+
 static inline Place place_of(const Scene *scene, ireal instance) {
     Place place;
     place.x = GATHER3(scene->placements, instance, .to_world[0]);
@@ -25,6 +46,9 @@ static inline Place place_of(const Scene *scene, ireal instance) {
     place.moved = vector(GATHER(real, scene->placements, instance, .to_world[0][3]),
                          GATHER(real, scene->placements, instance, .to_world[1][3]),
                          GATHER(real, scene->placements, instance, .to_world[2][3]));
+#if MOTION
+    place_moving(scene, GATHER(ireal, scene->motion_of, instance, .motion), &place);
+#endif
     real unit = GATHER(real, scene->placements, instance, .unit);
     place.unit = absolute(unit);
     // Products of M's own entries could overflow or underflow.
@@ -34,6 +58,10 @@ static inline Place place_of(const Scene *scene, ireal instance) {
     place.normal_z = cross3(x, y);
     place.side = unit < 0.0f ? (real)(-1.0f) : ONE;
     return place;
+}
+
+static inline real3 placed_vector(const Place *place, real3 v) {
+    return vector(dot3(place->x, v), dot3(place->y, v), dot3(place->z, v));
 }
 
 // A mesh's tangent in the world, of unit length; zero stays zero.

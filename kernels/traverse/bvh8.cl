@@ -78,7 +78,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
         } else {
 #if INSTANCES
             if (leaf.ray.instance == IN_WORLD) {
-                Ray object = object_ray(ray, scene->instances, ~reference >> 4);
+                Ray object = object_ray(scene, ray, ~reference >> 4);
                 TreeRays object_rays = tree_rays(scene, broadcast(object.origin), broadcast(object.direction), (real)(INFINITY));
                 leaf = leaf_ray(&object_rays.leaves, &object, 0);
                 slabs = slab_ray(&object_rays.slabs, &object, 0);

@@ -100,7 +100,7 @@ static inline int visit_node(const Scene *scene, Flight *f, const bool stop_at_f
 static inline int visit_leaf(const Scene *scene, Flight *f, const bool stop_at_first) {
 #if INSTANCES
     if (f->ray.leaf.ray.instance == IN_WORLD) {
-        Ray object = object_ray(&f->world.leaf.ray, scene->instances, ~f->reference >> 4);
+        Ray object = object_ray(scene, &f->world.leaf.ray, ~f->reference >> 4);
         FlightRays rays = flight_rays(broadcast(object.origin), broadcast(object.direction));
         f->ray = flight_ray(&rays, &object, 0);
         f->waiting[f->top] = LEAVE;

@@ -8,7 +8,7 @@ static inline bool in_world(const LeafRay *ray) { return ray->ray.instance == IN
 // Transform the ray into the frame of the instance at `place`; return the root of its BVH.
 static inline int enter_instance(const Scene *scene, const Ray *world, int place, LeafRay *leaf, SlabRay *slabs) {
     VISIT(instances, place);
-    Ray ray = object_ray(world, scene->instances, place);
+    Ray ray = object_ray(scene, world, place);
     real3 origin = broadcast(ray.origin), direction = broadcast(ray.direction);
     LeafRays leaves = leaf_rays(origin, direction);
     SlabRays all = slab_rays(direction);

@@ -67,6 +67,9 @@ static inline Hits next_hit(const Scene *scene, real3 origin, real3 direction, r
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(enabled, lane)) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
+#if MOTION
+        ray.time = LANE(scene->time, lane);
+#endif
 #if NEXT_HIT
         ray.after_t = LANE(after->t, lane);
         ray.after_primitive = LANE_INT(after->primitive, lane);
@@ -113,6 +116,9 @@ static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, r
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(enabled, lane)) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
+#if MOTION
+        ray.time = LANE(scene->time, lane);
+#endif
         VISIT(blocked, 0);
         const Hit none = {ray.t_max, 0.0f, 0.0f, -1};
         found.lane[lane] = traverse(scene, &rays, &ray, lane, true, &none).primitive;

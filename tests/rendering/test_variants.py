@@ -20,6 +20,7 @@ from clrt.rendering.accumulation import launch_plan
 from clrt.rendering.compile import pack_scene as pack_module
 from clrt.rendering.compile.choices import LANES, OFFSETS, Choices
 from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.cameras import CameraEnd
 from clrt.scene.light_images import LightImage
 from clrt.scene.lights import DirectionalLight, GoniometricLight, PointLight, ProjectorLight, SpotLight
 from clrt.scene.materials.material_types import MATERIALS, Dielectric, Diffuse, MetallicRoughness, Mirror
@@ -148,6 +149,9 @@ def sights(scene: Scene) -> Iterator[tuple[str, Scene]]:
     yield "distorted", replace(scene, camera=distorted)
     yield "distorted lens", replace(scene, camera=replace(distorted, aperture_radius=0.1))
     yield "fisheye", replace(scene, camera=replace(camera, projection="fisheye"))
+    moves = [Instance(mesh, to_world_end=np.column_stack([np.eye(3), [0.1, 0.2, 0]])) for mesh in scene.meshes[1:]]
+    moving = replace(camera, shutter=(0, 1), end=CameraEnd(position=(0.3, 3, 9)))
+    yield "moving", replace(scene, meshes=scene.meshes[:1], instances=[*scene.instances, *moves], camera=moving)
     for integrator in get_args(Integrator):
         if integrator not in ("path", "direct"):
             yield integrator, replace(scene, render=replace(scene.render, integrator=integrator))

@@ -52,3 +52,10 @@ def test_wrong_pairs() -> None:
         clrt.stereo_pair(clrt.Camera(), 0.1, converge_at=0, size=SIZE)
     with pytest.raises(UsageError, match="has no matrix"):
         clrt.stereo_pair(clrt.Camera(projection="equirectangular"), 0.1, converge_at=2, size=SIZE)
+
+
+def test_a_moving_camera_is_moved_at_both_ends() -> None:
+    """The pair at the end of the exposure is that of the camera there."""
+    camera = clrt.Camera(shutter=(0, 1), end=clrt.CameraEnd(position=(3, 1, 0), up=(0.1, 1, 0)))
+    for moving, end in zip(clrt.stereo_pair(camera, 0.1), clrt.stereo_pair(camera.at_end, 0.1)):
+        np.testing.assert_allclose(moving.at_end.world_to_camera, end.world_to_camera, atol=1e-12)

@@ -226,6 +226,9 @@ class _Stage:
             focus_distance=focus if lens else None,
             view_height=None,
             distortion=self._distortion() if projection == "perspective" else (),
+            shutter=(0.0, 0.0),
+            rolling_shutter=0.0,
+            end=None,
         )
         return draws.record(Camera, **Camera(projection=projection).unread_fields() | given)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,8 @@ from ...aov_types import AOV_TYPES, aovs_from
 from ...device.programs.preamble import typedefs
 from ...device.programs.struct_types import record
 from ...scene.cryptomatte import NAMES, RANKS, ids_of
-from ...scene.model import Scene
+from ...scene.exposure import camera_at, middle_of_rows
+from ...scene.model import Camera, Scene
 from ...scene.numbered_objects import materials_of
 from ..compile.compile_scene import CompiledScene
 from .accumulation import Accumulation
@@ -82,17 +83,28 @@ def _places(
     session: Accumulation, seen: NDArray[np.float64], missed: NDArray[np.bool_]
 ) -> dict[str, NDArray[np.generic]]:
     """Return position and depth of points (height, width, 3) given in the compiled scene's frame."""
-    camera, frame = session.compiled.camera, session.compiled.frame
-    axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
-    ahead = seen - camera.position
-    if camera.type.all_around:
-        depth = np.linalg.norm(ahead, axis=-1) / frame.unit
-    else:
-        depth = ahead @ (axis / np.linalg.norm(axis)) / frame.unit
+    frame, depth = session.compiled.frame, np.zeros(missed.shape)
+    for rows, camera in _cameras(session):
+        axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
+        ahead = (seen[rows] - camera.position) / frame.unit
+        along = np.linalg.norm(ahead, axis=-1) if camera.type.all_around else ahead @ (axis / np.linalg.norm(axis))
+        depth[rows] = along
     return {
         "position": np.where(missed[..., None], 0, seen / frame.unit + frame.center).astype(np.float32),
         "depth": np.where(missed, np.inf, depth).astype(np.float32),
     }
+
+
+def _cameras(session: Accumulation) -> Iterator[tuple[slice, Camera]]:
+    """Yield rows of the image with the camera at the middle of their exposure."""
+    camera, height = session.compiled.camera, session.size[1]
+    if not camera.moves:
+        yield slice(None), camera
+        return
+    middles = middle_of_rows(camera, height)
+    for s in np.unique(middles):
+        rows = np.flatnonzero(middles == s)
+        yield slice(rows[0], rows[-1] + 1), camera_at(camera, float(s))
 
 
 def coverage(session: Accumulation, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:

@@ -23,6 +23,7 @@ from ...errors import NoRoomError
 from ...scene.model import Camera
 from ..compile.camera_kernel import camera_fields, launch_record
 from ..compile.compile_scene import QUEUES, RASTER, CompiledScene
+from ..compile.film_record import launch_type
 from .checked_loops import most_samples
 from .path_queues import PathQueues
 from .raster_bins import RasterBins
@@ -142,8 +143,8 @@ class SceneOnDevice:
         """Use this camera for subsequent launches; its kernel file must be that of the previous one."""
         self.compiled = self.compiled.seen_by(camera, *self.compiled.chosen_files["CAMERA"])
         width, height = int(self.launch["width"][0]), int(self.launch["height"][0])
-        record = launch_record(self.compiled.camera, (width, height))
-        for name in camera_fields(camera):
+        record = launch_record(self.compiled.camera, (width, height), launch_type(self.compiled.features))
+        for name in camera_fields(record.dtype):
             self.launch[name] = record[name]
 
     def warm_up(self, film: cl.Buffer, tiles: cl.Buffer) -> None:

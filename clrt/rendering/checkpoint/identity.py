@@ -100,7 +100,14 @@ def _part(scene: Scene, name: str) -> object:
     if name != "instances":
         return getattr(scene, name)
     meshes, which = prototypes(scene.instances)
-    return meshes, which, [(each.to_world, each.material or each.mesh.material) for each in scene.instances]
+    return (
+        meshes,
+        which,
+        [
+            (each.to_world, each.to_world_end, each.pivot, each.material or each.mesh.material)
+            for each in scene.instances
+        ],
+    )
 
 
 def _digest(value: object) -> str:

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from ...device.programs.preamble import Buffers
 from ...scene.cameras import Camera, View
+from ...scene.exposure import frame_of_camera
+from ...scene.geometry.motion import Turns
 from ...scene.ray_list import RayList
-from .records import LAUNCH, LENS, LISTED_RAY
+from .records import CAMERA_MOTION, EXPOSURE, LAUNCH, LENS, LISTED_RAY
 
-#: Camera fields of the launch record.
+#: Camera fields of every launch record.
 CAMERA_FIELDS = ("position", "right", "up", "forward", "lens_radius")
 #: How far beyond the image's edges the widest filter reaches, in pixels, generously.
 BEYOND = 4
@@ -47,31 +49,56 @@ def camera_defines(camera: Camera) -> dict[str, int]:
 
 
 def launch_of(camera: Camera, kind: np.dtype[Any] = LAUNCH) -> np.dtype[Any]:
-    """Return a launch record of a kind with the lens's distortion if the camera's kernel file reads that."""
-    return np.dtype([*kind.descr, *LENS.descr]) if camera.type.distorts else kind
+    """Return a launch record of a kind with the lens's distortion if the camera's kernel file reads that, and with the
+    camera's motion if it moves."""
+    lens, motion = LENS.descr * camera.type.distorts, CAMERA_MOTION.descr * camera.moves
+    return np.dtype([*kind.descr, *lens, *motion]) if lens or motion else kind
 
 
-def camera_fields(camera: Camera) -> tuple[str, ...]:
-    """Return the names of the fields of its launch record that depend on the camera."""
-    return CAMERA_FIELDS + (LENS.names or ()) * camera.type.distorts
+def camera_fields(kind: np.dtype[Any]) -> list[str]:
+    """Return the names of the fields of a launch record that depend on the camera."""
+    theirs = {*CAMERA_FIELDS, *(name for each in (LENS, CAMERA_MOTION, EXPOSURE) for name in each.names or ())}
+    return [name for name in kind.names or () if name in theirs]
 
 
 def launch_record(camera: Camera, size: tuple[int, int], kind: np.dtype[Any] = LAUNCH) -> NDArray[Any]:
     """Return a launch record of a kind with camera and size. The camera's kernel file defines right, up and forward."""
     width, height = size
-    forward = np.subtract(camera.look_at, camera.position, dtype=np.float64)
-    distance = np.linalg.norm(forward)
-    forward /= distance
-    right = np.cross(forward, np.asarray(camera.up, np.float64))
-    right /= np.linalg.norm(right)
-    view = View(right, np.cross(right, forward), forward, float(distance), width, height)
+    view = view_of(camera, size)
     record = np.zeros(1, launch_of(camera, kind))
     record["position"], record["lens_radius"] = camera.position, camera.aperture_radius
     record["right"], record["up"], record["forward"] = camera.type.axes(camera, view)
     record["width"], record["height"] = width, height
     if camera.type.distorts:
         _set_lens(record, camera, size)
+    if camera.moves:
+        _set_motion(record, camera, size)
+    if "open_share" in (record.dtype.names or ()):
+        record["open_share"] = (camera.shutter[1] - camera.shutter[0]) / camera.exposure
+        record["row_share"] = camera.rolling_shutter / camera.exposure
     return record
+
+
+def view_of(camera: Camera, size: tuple[int, int]) -> View:
+    """Return the view of a camera for images of a size, at the start of its exposure."""
+    forward = np.subtract(camera.look_at, camera.position, dtype=np.float64)
+    distance = np.linalg.norm(forward)
+    forward /= distance
+    right = np.cross(forward, np.asarray(camera.up, np.float64))
+    right /= np.linalg.norm(right)
+    return View(right, np.cross(right, forward), forward, float(distance), *size)
+
+
+def _set_motion(record: NDArray[Any], camera: Camera, size: tuple[int, int]) -> None:
+    """Set the fields of CAMERA_MOTION."""
+    frames, axes = [], []
+    for each in (camera, camera.at_end):
+        frames.append(frame_of_camera(each))
+        axes.append(np.array(camera.type.axes(each, view_of(each, size))) @ frames[-1])
+    turn = Turns.between(*(frame[None] for frame in frames))
+    record["turn_middle"], record["turn_change"], record["turn_angle"] = turn
+    record["moved"] = np.subtract(camera.at_end.position, camera.position)
+    record["axes"], record["axes_change"] = axes[0], axes[1] - axes[0]
 
 
 def _set_lens(record: NDArray[Any], camera: Camera, size: tuple[int, int]) -> None:

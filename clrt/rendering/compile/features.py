@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable
 from ...accel.layouts import NO_RAYS
 from ...accel.traversal_kernels import tree_defines, tree_features, tree_files
 from ...device.programs.preamble import defines, scene_struct, type_list, typedefs
+from ...scene.exposure import motion_features
 from ...scene.materials.material_types import MATERIALS, Material
 from ...scene.materials.textures import Texture
 from ...scene.model import Camera, RenderSettings, Scene
@@ -47,8 +48,9 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
     features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
     features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
     features |= set().union(emitters.features, *(material.features() for material in packed.shapes.users))
-    features |= packed.film
+    features |= packed.film | motion_features(scene)
     has = {
+        "TIME": bool(motion_features(scene)),
         **tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone, packed.tree is not NO_RAYS),
         "SPHERES": bool(scene.spheres),
         "INSTANCES": bool(scene.instances),
@@ -95,6 +97,8 @@ def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str
     unit = {"SCENE_UNIT": packed.frame.unit} if lengths else {}
     surfaces = [t for t in emitters.types if t in SURFACES]
     rasterised = [typedefs({"Outline": OUTLINE}), defines({"FILTER_REACH": filter_reach(packed.scene.render.filter)})]
+    others = ["int bare"] if "CATCHER" in features else []
+    others += [f"float{choices.lanes if choices.lanes > 1 else ''} time"] if "TIME" in features else []
     catching = [type_list("CATCHER_TYPES", _numbered(materials.with_value("catcher")))]
     return "\n".join(
         [
@@ -103,7 +107,7 @@ def preamble_of(packed: PackedScene, choices: ResolvedChoices, features: set[str
             defines({**{feature: 1 for feature in sorted(features)}, **camera_defines(packed.scene.camera)}),
             typedefs({"Counts": COUNTS, "Pixel": pixel_record(features, len(packed.groups)), "Guide": GUIDE}),
             launch_typedef(packed.scene.camera, features),
-            scene_struct(packed.buffers, part_bytes, ["int bare"] if "CATCHER" in features else []),
+            scene_struct(packed.buffers, part_bytes, others),
             type_list("MATERIAL_TYPES", _numbered(materials.used)),
             type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),
             type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),
@@ -135,6 +139,7 @@ def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict
             bool(scene.spheres),
             packed.shapes.lone,
             bool(scene.instances),
+            "MOTION" in features,
         ),
         **{f"{part}_FILE": [f"bsdf/{part.lower()}.cl"] if part in features else [] for part in parts},
         "PLACEMENT_FILE": ["surface/instance_transform.cl"] if scene.instances else [],
@@ -153,6 +158,8 @@ def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict
         "HORIZON_FILE": ["surface/horizon.cl"] if "HORIZON" in features else [],
         "SAMPLER": [f"sampler/{scene.render.sampler}.cl"],
         "CAMERA": [camera_file(scene.camera, integrator)],
+        "SHUTTER_FILE": ["integrator/shutter.cl"] if "TIME" in features else [],
+        "CAMERA_MOTION_FILE": ["camera/moving.cl"] if "CAMERA_MOTION" in features else [],
         "FILTER": ["film/box_filter.cl" if scene.render.filter == "box" else "film/table_filter.cl"],
         "INTEGRATOR": [_integrator_file(scene)],
         "HIT_ORDER": [f"integrator/queue_{'sorted' if 'SORT_HITS' in features else 'unsorted'}.cl"],

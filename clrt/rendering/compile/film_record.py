@@ -11,7 +11,7 @@ from ...scene.light_groups import light_groups
 from ...scene.model import Scene
 from ..film.backdrop import catches, sees_environment
 from .choices import Choices
-from .records import ALPHA, CATCHER, DIRECT, LAUNCH, LAUNCH_OF_CATCHERS, PIXEL, group_record
+from .records import ALPHA, CATCHER, DIRECT, EXPOSURE, LAUNCH, LAUNCH_OF_CATCHERS, PIXEL, group_record
 
 #: Records that follow PIXEL in a film, by the feature that is compiled in with them.
 PARTS = {"DIRECT_LIGHT": DIRECT, "ALPHA": ALPHA, "CATCHER": CATCHER}
@@ -47,4 +47,5 @@ def film_pixel(scene: Scene, choices: Choices) -> np.dtype[Any]:
 
 def launch_type(features: Collection[str]) -> np.dtype[Any]:
     """Return the record of a launch of a program with these features."""
-    return LAUNCH_OF_CATCHERS if "CATCHER" in features else LAUNCH
+    kind = LAUNCH_OF_CATCHERS if "CATCHER" in features else LAUNCH
+    return np.dtype([*kind.descr, *EXPOSURE.descr]) if "TIME" in features else kind

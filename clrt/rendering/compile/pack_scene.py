@@ -14,6 +14,7 @@ from ...accel.layouts import NO_RAYS, Layout, leaf_spheres
 from ...accel.traversal_kernels import tree_buffers
 from ...device.open import Device
 from ...device.programs.preamble import Buffers
+from ...scene.exposure import exposed
 from ...scene.geometry.instancing import arranged
 from ...scene.geometry.scaling import SceneFrame, frame_of, in_frame
 from ...scene.materials.material_types import Material
@@ -44,7 +45,7 @@ class Shapes:
     """
 
     def __init__(self, scene: Scene) -> None:
-        scene, *of_objects = arranged(with_vertex_alpha(scene))
+        scene, *of_objects = arranged(with_vertex_alpha(exposed(scene)))
         self.frame = frame_of(scene)
         scene = in_frame(scene, self.frame)
         self.objects = ObjectIds([len(mesh.faces) for mesh in scene.meshes], len(scene.spheres), *of_objects)
@@ -109,6 +110,7 @@ class Shapes:
             buffers["spheres"] = ("Sphere", sphere_records(spheres, of_spheres, emitters.sphere))
         if self.scene.instances:
             buffers["placements"] = ("Placement", self.placements.records(of_instances))
+            buffers |= self.placements.motions()
         return buffers
 
 
@@ -149,7 +151,7 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: R
     finally:  # else it could replace the next scene's environment
         sky = packing()
     textures, tables = PackedTextures(), MaterialTables()
-    emitters = pack_emitters(shapes.scene, sky, textures)
+    emitters = pack_emitters(shapes.scene, sky, textures, shapes.placements)
     materials = pack_materials(shapes.users, textures, tables, scene.render.back_face_culling)
     buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, normals, tree is not NO_RAYS)
     buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.tangents)

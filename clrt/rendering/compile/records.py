@@ -22,6 +22,25 @@ SPHERE = record(center="3f4", radius="f4", material="i4", light="i4", pad="2i4")
 PLACEMENT = record(
     to_world="(3,4)f4", rounding0="3f4", first="i4", rounding1="3f4", material="i4", rounding2="3f4", unit="f4"
 )
+#: The motion of an instance (kernels/geometry/motion.cl), as scene.geometry.motion defines it. from_inner, from_outer:
+#: the inverses.
+MOTION = record(
+    middle="4f4",
+    change="4f4",
+    offset="3f4",
+    angle="f4",
+    moved="3f4",
+    pad0="i4",
+    growth="3f4",
+    pad1="i4",
+    inner="(3,4)f4",
+    outer="(3,3)f4",
+    from_inner="(3,3)f4",
+    from_outer="(3,3)f4",
+    pad2="i4",
+)
+#: The number of a placement's motion, or −1.
+MOTION_NUMBER = np.dtype([("motion", "i4")])
 
 #: A light, a group of lights, or an infinite light (kernels/light/choice.cl, tree.cl).
 LIGHT_GROUP = record(
@@ -44,6 +63,8 @@ TRIANGLE_LIGHT = record(
     radiance="3f4",
     double_sided="i4",
 )
+#: The placement of a triangle light that moves, or −1.
+LIGHT_PLACEMENT = np.dtype([("placement", "i4")])
 #: sphere: its number among the spheres.
 SPHERE_LIGHT = record(
     center="3f4", radius="f4", radiance="3f4", texture="i4", sphere="i4", double_sided="i4", pad="2i4"
@@ -96,6 +117,20 @@ LAUNCH = record(
 #: The distortion of a lens (kernels/camera/radial_lens.cl), at the end of the launch records of cameras that have it.
 #: across, down: rows that map (sx, sy, 1) to the image plane at distance 1; reach: the largest radius that has a ray.
 LENS = record(numerator="4f4", denominator="3f4", reach="f4", across="3f4", p1="f4", down="3f4", p2="f4")
+#: The exposure of images in which something moves: shares of its time in which a row's shutter is open, and by which
+#: the last row's opens after the first's.
+EXPOSURE = record(open_share="f4", row_share="f4", pad_exposure="2i4")
+#: The motion of a camera (kernels/camera/moving.cl): of its position, and of right, up and forward (axes, and their
+#: change) in its own frame, which turns as a MOTION does.
+CAMERA_MOTION = record(
+    turn_middle="4f4",
+    turn_change="4f4",
+    moved="3f4",
+    turn_angle="f4",
+    axes="(3,3)f4",
+    axes_change="(3,3)f4",
+    pad_axes="2i4",
+)
 #: A ray of a RayList (kernels/camera/listed_rays.cl).
 LISTED_RAY = record(origin="3f4", reach="f4", direction="3f4", pad0="i4", surface_normal="3f4", pad1="i4")
 TEXTURE = record(

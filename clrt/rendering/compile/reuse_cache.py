@@ -21,6 +21,11 @@ from .moved_tree import MovedTree
 FloatArray = NDArray[np.float32]
 
 
+def _all_equal(arrays: list[NDArray[Any]], others: list[NDArray[Any]]) -> bool:
+    """Return whether two lists have equal arrays."""
+    return len(arrays) == len(others) and all(map(np.array_equal, arrays, others))
+
+
 class ReuseCache:
     """Cache of the last BVH and environment. If only instances or only vertices moved, the BVH buffers are updated,
     also on the device."""
@@ -34,7 +39,7 @@ class ReuseCache:
         self._tree: Layout | None = None
         self._levels: TwoLevelBvh | None = None
         self._moved: MovedTree | None = None
-        self._to_world: NDArray[np.float64] = np.zeros(0)
+        self._places: list[NDArray[Any]] = []
 
     def sky(self, environment: Environment) -> EnvironmentMap:
         """Return `pack_sky` of the environment, cached while it is the same object."""
@@ -70,8 +75,12 @@ class ReuseCache:
                 last = moved
             else:
                 self._moved, last = None, build_tree(device, layout, builder, triangles, spheres, test)
-        if self._levels and not (same and np.array_equal(self._to_world, placements.to_world)):
-            last, self._to_world = self._levels.place(placements.to_world), placements.to_world
+        places = placements.paths
+        if self._levels and not (same and _all_equal(places, self._places)):
+            last = self._levels.place(
+                placements.to_world, placements.moving, placements.motion and placements.motion.boxes
+            )
+            self._places = places
         assert last
         self._tree = last
         return last

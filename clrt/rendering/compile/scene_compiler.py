@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...device.open import Device
+from ...scene.exposure import motion_features
 from ...scene.model import Scene
 from ...scene.validation.validate import validate
 from .camera_kernel import camera_file
@@ -68,4 +69,8 @@ class SceneCompiler:
 def _differs_in_passing(scene: Scene, last: Scene) -> bool:
     """Return whether at most the camera and PASSING settings differ."""
     passing = {name: getattr(last.render, name) for name in PASSING}
-    return same_world(scene, last) and replace(scene.render, **passing) == last.render
+    return (
+        same_world(scene, last)
+        and replace(scene.render, **passing) == last.render
+        and motion_features(scene) == motion_features(last)
+    )

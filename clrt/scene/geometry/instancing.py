@@ -33,32 +33,38 @@ class ArrangedScene(NamedTuple):
 def arranged(scene: Scene) -> ArrangedScene:
     """Return the same scene with instances only if they save memory; the others become meshes.
 
-    A mesh that the scene also contains directly becomes one more instance. Emissive instances become meshes, so that
-    light sampling need not handle instances.
+    A mesh that the scene also contains directly becomes one more instance. Instances that move stay, and emissive
+    ones of these get a mesh of their own, whose triangles are their lights. Other emissive instances become meshes, so
+    that light sampling need not handle instances.
     """
     shown = meshes_by_id(scene.instances)
     itself = [i for i, mesh in enumerate(scene.meshes) if id(mesh) in shown]
     others = [i for i, mesh in enumerate(scene.meshes) if id(mesh) not in shown]
     every = [Instance(scene.meshes[i], name=scene.meshes[i].name) for i in itself] + scene.instances
     objects = itself + list(range(len(scene.meshes), len(scene.meshes) + len(scene.instances)))
-    keeps = worth_it(every)
+    keeps = [saves or each.to_world_end is not None for saves, each in zip(worth_it(every), every)]
     kept = [i for i, keep in enumerate(keeps) if keep]
     rest = [i for i, keep in enumerate(keeps) if not keep]
     meshes = [scene.meshes[i] for i in others] + [baked(every[i]) for i in rest]
     return ArrangedScene(
-        replace(scene, instances=[every[i] for i in kept], meshes=meshes),
+        replace(scene, instances=[_alone_if_emissive(every[i]) for i in kept], meshes=meshes),
         others + [objects[i] for i in rest],
         [objects[i] for i in kept],
     )
 
 
 def worth_it(instances: list[Instance]) -> list[bool]:
-    """Return which instances save memory; the others should become meshes."""
+    """Return which instances save memory; the others should become meshes, unless they move."""
     glows = [any(_material(each).radiance) for each in instances]
     copies = Counter(_stored(each) for each, glow in zip(instances, glows) if not glow)
     sizes = {_stored(each): len(each.mesh.faces) for each in instances}
     saved = sum((count - 1) * sizes[stored] for stored, count in copies.items())
     return [saved > FEW_TRIANGLES and not glow and copies[_stored(each)] > 1 for each, glow in zip(instances, glows)]
+
+
+def _alone_if_emissive(instance: Instance) -> Instance:
+    """Return the instance, of a mesh of its own if it emits light."""
+    return replace(instance, mesh=painted(instance)) if any(_material(instance).radiance) else instance
 
 
 def baked(instance: Instance) -> Mesh:

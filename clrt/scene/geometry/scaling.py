@@ -84,8 +84,10 @@ def _instance_boxes(instances: list[Instance]) -> list[tuple[NDArray[np.floating
     boxes = []
     for each in instances:
         low, high = own[id(each.mesh)]
-        middle, half = each.to_world @ [*(low + high) / 2, 1.0], np.abs(each.to_world[:, :3]) @ (high - low) / 2
-        boxes.append((middle - half, middle + half))
+        for matrix in (each.to_world, each.to_world_end):
+            if matrix is not None:
+                middle, half = matrix @ [*(low + high) / 2, 1.0], np.abs(matrix[:, :3]) @ (high - low) / 2
+                boxes.append((middle - half, middle + half))
     return boxes
 
 
@@ -118,17 +120,29 @@ def _instances(instances: list[Instance], frame: SceneFrame) -> list[Instance]:
     placed = []
     for each in instances:
         around = own[id(each.mesh)]
-        linear = each.to_world[:, :3] * (frame.unit / around.unit)
-        offset = (each.to_world @ [*around.center, 1.0] - frame.center) * frame.unit
+        end, pivot = each.to_world_end, each.pivot
+        if end is not None:
+            end, pivot = (
+                _between(end, around, frame),
+                _between(np.eye(3, 4) if pivot is None else pivot, around, SceneFrame()),
+            )
         placed.append(
             replace(
                 each,
                 mesh=framed[id(each.mesh)],
-                to_world=np.column_stack([linear, offset]),
+                to_world=_between(each.to_world, around, frame),
                 material=each.material and each.material.in_unit(frame.unit),
+                to_world_end=end,
+                pivot=pivot,
             )
         )
     return placed
+
+
+def _between(matrix: NDArray[np.float64], around: SceneFrame, frame: SceneFrame) -> NDArray[np.float64]:
+    """Return an affine matrix (3, 4) whose points are in the frame `around`, and their images in `frame`."""
+    linear = matrix[:, :3] * (frame.unit / around.unit)
+    return np.column_stack([linear, (matrix @ [*around.center, 1.0] - frame.center) * frame.unit])
 
 
 def camera_in(camera: Camera, frame: SceneFrame) -> Camera:
@@ -136,6 +150,11 @@ def camera_in(camera: Camera, frame: SceneFrame) -> Camera:
     moved = replace(
         camera.scaled(frame.unit), position=frame.point(camera.position), look_at=frame.point(camera.look_at)
     )
+    if moved.end:
+        ends: dict[str, Any] = {
+            name: frame.point(at) for name, at in moved.end.changes.items() if name in ("position", "look_at")
+        }
+        moved = replace(moved, end=replace(moved.end, **ends))
     return replace(moved, origins=frame.points(moved.origins)) if isinstance(moved, RayList) else moved
 
 

@@ -109,7 +109,8 @@ def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
     corners = np.array([[*camera.position, 1], [*camera.look_at, 1], [*camera.up, 0]]) @ matrix.T
     position, look_at, up = corners[:, :3].tolist()
     stretch = float(np.linalg.norm(up) / np.linalg.norm(camera.up))
-    return replace(camera.scaled(stretch), position=position, look_at=look_at, up=up)
+    moved = replace(camera.scaled(stretch), position=position, look_at=look_at, up=up, end=None)
+    return moved.moving_to(transform_camera(camera.at_end, matrix)) if camera.end else moved
 
 
 def transform_light(light: Light, matrix: Matrix) -> Light:

@@ -36,6 +36,11 @@ def placement_faults(to_world: NDArray[np.float64], vertices: NDArray[np.float32
     return ["moves the mesh outside the range of float32"] if (reach > FLOAT32_MAX).any() else []
 
 
+def are_mirrored(one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+    """Return whether one of two invertible transforms (3, 4) mirrors, and the other does not."""
+    return bool(np.linalg.det(one[:, :3]) * np.linalg.det(other[:, :3]) < 0)
+
+
 def _is_regular(to_world: NDArray[np.float64]) -> bool:
     (a, b, c, x), (d, e, f, y), (g, h, i, z) = to_world.tolist()
     length = max(hypot(a, d, g), hypot(b, e, h), hypot(c, f, i))

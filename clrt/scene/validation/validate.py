@@ -11,6 +11,7 @@ from os import PathLike
 from ...errors import ObjectError, SceneError, UsageError
 from ..animation import Animation, ModelAnimation, SceneAnimation
 from ..camera_path import animation_problems
+from ..exposure import motion_features
 from ..fields.field_types import show
 from ..fields.validated import Validated
 from ..lights import LIGHTS, BaseLight
@@ -62,7 +63,9 @@ def scene_problems(scene: Scene) -> list[str]:
     for field, (name, kind) in LISTS.items():
         for i, part in enumerate(getattr(scene, field)):
             problems += _problems(part, kind, f"{name}[{i}]")
-    return problems or _animation_problems(scene) or _raster_problems(scene) or _local_problems(scene)
+    for of_scene in (_animation_problems, _raster_problems, _local_problems, _moving_raster_problems):
+        problems = problems or of_scene(scene)
+    return problems
 
 
 def _list_problems(scene: Scene) -> list[str]:
@@ -114,6 +117,16 @@ def _raster_problems(scene: Scene) -> list[str]:
     return [
         f'render.integrator: "raster" supports only pinhole cameras, and the camera has {shown}; leave that out, '
         'or write "local"'
+    ]
+
+
+def _moving_raster_problems(scene: Scene) -> list[str]:
+    """Return a problem if the raster integrator is to render motion."""
+    if scene.render.integrator != "raster" or not motion_features(scene):
+        return []
+    return [
+        'render.integrator: "raster" does not support motion blur; write "local", or leave out the shutter and '
+        "rolling_shutter of the camera"
     ]
 
 

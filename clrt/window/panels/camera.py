@@ -28,7 +28,7 @@ class CameraPanel:
         )
         imgui.set_item_tooltip("Walking speed per second, relative to the distance to the look-at point.")
         imgui.push_id("camera")
-        new = editor.edited(camera)
+        new = editor.edited(camera, without={"end"})
         imgui.pop_id()
         if new is not camera:
             editor.edit(camera=new)

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from ....accel.bvh import Triangles
 from ....accel.two_level import TwoLevelBvh, inverse
 from ....device.open import Device
+from ....scene.exposure import motion_of
 from ....scene.geometry.instancing import prototypes
+from ....scene.geometry.motion import ROUNDING
 from ....scene.model import Instance
-from ..records import PLACEMENT
+from ..records import MOTION, MOTION_NUMBER, PLACEMENT
 
 Doubles = NDArray[np.float64]
 FloatArray = NDArray[np.float32]
@@ -22,6 +24,8 @@ IntArray = NDArray[np.int64]
 #: Relative rounding error of a coordinate transformed from the world to the mesh's frame (the matrix's entry, a
 #: product, three sums) and back.
 ROUNDINGS = 12 * 2.0**-24
+#: The same for transforms that are computed for a time, twice, from a quaternion and factors of the matrix.
+MOTION_ROUNDINGS = 2 * ROUNDING
 
 
 class PackedInstances:
@@ -29,7 +33,8 @@ class PackedInstances:
 
     meshes: those that instances show; their triangles are stored one mesh after another, followed by those of the rest.
     before: number of triangles before the rest's. materials: (k,), each instance's. starts: first triangle of each
-    mesh. mesh, to_world: mesh and transform of each placement, the rest first.
+    mesh. mesh, to_world: mesh and transform of each placement, the rest first. moving: (m,), numbers of the placements
+    that move; motion: theirs, None if there are none.
     """
 
     def __init__(self, instances: list[Instance], rest: bool) -> None:
@@ -40,6 +45,15 @@ class PackedInstances:
         itself = [np.eye(3, 4)] * rest
         self.to_world = np.array([*itself, *(instance.to_world for instance in instances)])
         self.mesh = np.concatenate([np.full(len(itself), len(self.meshes), np.int32), which])
+        places = [i for i, each in enumerate(instances) if each.to_world_end is not None]
+        self.moving = np.array(places, np.int32) + np.int32(rest)
+        self.motion = motion_of([instances[i] for i in places]) if places else None
+
+    @property
+    def paths(self) -> list[NDArray[Any]]:
+        """All that defines the places of the instances at all times."""
+        motion = [] if self.motion is None else [*self.motion.turn, *self.motion[1:]]
+        return [self.to_world, self.moving, *motion]
 
     def levels(
         self,
@@ -65,7 +79,26 @@ class PackedInstances:
         records["first"] = self.starts[self.mesh]
         records["material"] = np.concatenate([np.full(len(records) - len(codes), -1), codes])
         records["unit"] = np.sign(np.linalg.det(linear)) / np.abs(linear).max(axis=(1, 2))
+        if self.motion is not None:
+            bound = MOTION_ROUNDINGS * self.motion.to_world_bound()
+            for row in range(3):
+                records[f"rounding{row}"][self.moving] = bound[:, row]
+            records["unit"][self.moving] = np.sign(records["unit"][self.moving]) / self.motion.size()
         return records
+
+    def motions(self) -> dict[str, tuple[str, NDArray[Any]]]:
+        """Return the buffers of kernels/geometry/motion.cl; none if nothing moves."""
+        if self.motion is None:
+            return {}
+        motion, records = self.motion, np.zeros(len(self.moving), MOTION)
+        records["middle"], records["change"], records["angle"] = motion.turn
+        records["offset"], records["moved"] = motion.offset[:, 0], motion.offset[:, 1]
+        records["inner"], records["outer"], records["growth"] = motion.inner, motion.outer, motion.growth
+        records["from_inner"] = np.linalg.inv(motion.inner[..., :3])
+        records["from_outer"] = np.linalg.inv(motion.outer)
+        numbers = np.full(len(self.mesh), -1, np.int32)
+        numbers[self.moving] = np.arange(len(self.moving))
+        return {"motions": ("Motion", records), "motion_of": ("MotionNumber", numbers.view(MOTION_NUMBER))}
 
 
 @dataclass(frozen=True)

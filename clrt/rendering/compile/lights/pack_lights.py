@@ -17,8 +17,9 @@ from ....scene.light_images import LightImage
 from ....scene.lights import Bounds, DistantBounds, Light
 from ....scene.materials.textures import Texture
 from ....scene.model import Scene
+from ..geometry.pack_instances import PackedInstances
 from ..materials.pack_textures import PackedTextures
-from ..records import SPHERE_LIGHT, parameter_record
+from ..records import LIGHT_PLACEMENT, SPHERE_LIGHT, parameter_record
 from .environment_map import LUMINANCE, EnvironmentMap
 from .hidden_lights import hidden_lights, opaque_and_sides
 from .light_bounds import Doubles, distant_lights, joined, placed_lights, round_lights
@@ -51,9 +52,11 @@ class PackedLights:
         return sum(self.counts.values())
 
 
-def pack_emitters(scene: Scene, sky: EnvironmentMap, textures: PackedTextures) -> PackedLights:
-    """Pack all lights of the scene that are not black."""
-    flat = pack_triangle_lights(scene.meshes, textures)
+def pack_emitters(
+    scene: Scene, sky: EnvironmentMap, textures: PackedTextures, placements: PackedInstances | None = None
+) -> PackedLights:
+    """Pack all lights of the scene that are not black; placements: see `pack_triangle_lights`."""
+    flat = pack_triangle_lights(scene.meshes, textures, placements)
     balls = _sphere_lights(scene, textures)
     of_sphere = np.full(len(scene.spheres), -1, np.int32)
     of_sphere[balls["sphere"]] = len(flat.records) + np.arange(len(balls))
@@ -78,6 +81,9 @@ def pack_emitters(scene: Scene, sky: EnvironmentMap, textures: PackedTextures) -
     names = {kind: f"{kind.title().replace('_', '')}Light" for kind in counts if kind != "sky"}
     buffers = {f"{kind}_lights": (name, records[kind]) for kind, name in names.items()} | images.buffers()
     features = frozenset[str]().union(*(light.features() for own in lights.values() for light in own))
+    if (flat.place >= 0).any():
+        buffers["light_placements"] = ("LightPlacement", flat.place.view(LIGHT_PLACEMENT))
+        features |= {"MOVING_LIGHTS"}
     return PackedLights(buffers | choice.buffers, counts, features, flat.light, of_sphere, choice)
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ....scene.materials.textures import Texture
 from ....scene.model import Mesh
 from ..geometry.pack_geometry import TriangleCorners
+from ..geometry.pack_instances import PackedInstances
 from ..materials.pack_textures import PackedTextures
 from ..records import TRIANGLE_LIGHT
 from .environment_map import LUMINANCE
@@ -26,19 +27,23 @@ Integers = NDArray[np.int64]
 
 class TriangleLights(NamedTuple):
     """Packed triangle lights. records: of n lights. groups: light bounds. light: (m,) int32, of each triangle, or
-    −1."""
+    −1. place: (n,) int32, the placements of those that move, or −1."""
 
     records: NDArray[Any]
     groups: LightGroups
     light: NDArray[np.int32]
+    place: NDArray[np.int32]
 
 
-def pack_triangle_lights(meshes: list[Mesh], textures: PackedTextures) -> TriangleLights:
+def pack_triangle_lights(
+    meshes: list[Mesh], textures: PackedTextures, placements: PackedInstances | None = None
+) -> TriangleLights:
     """Pack the emissive triangles of the meshes, in order, except for those that are black, have no area in float32, or
     are hidden by an earlier one in the same place.
 
     Textured ones are never joined, and are sampled according to the texels they cover. Those whose opacity varies are
-    not joined either, as it is read at the texture coordinates of one triangle.
+    not joined either, as it is read at the texture coordinates of one triangle. placements: of the first meshes, those
+    of which that emit light move, and once each; their lights are in their own frames, and bounded in all poses.
     """
     mesh = np.repeat(np.arange(len(meshes)), [len(each.faces) for each in meshes])
     emission = np.array([each.material.radiance for each in meshes], np.float64).reshape(-1, 3)
@@ -57,7 +62,11 @@ def pack_triangle_lights(meshes: list[Mesh], textures: PackedTextures) -> Triang
     area = _normals(corners)[1] / 2
     opaque, sides = opaque_and_sides([each.material for each in meshes])
     seen = (emission[mesh[lamps]] * around).any(axis=1) & (area.astype(np.float32) > 0)
-    seen &= ~hidden_lights(np.column_stack([corners.reshape(-1, 9), sides[mesh[lamps]]]), opaque[mesh[lamps]])
+    place = np.full(len(meshes), -1)
+    if placements is not None:
+        place[placements.mesh[placements.moving]] = placements.moving
+    shapes = np.column_stack([corners.reshape(-1, 9), sides[mesh[lamps]], place[mesh[lamps]]])
+    seen &= ~hidden_lights(shapes, opaque[mesh[lamps]])
     lamps, around = lamps[seen], around[seen]
     corners, whole = _joined(corners[seen], mesh[lamps], lamps, ~uneven[mesh[lamps]])
     begins = np.ones(len(lamps), bool)
@@ -68,7 +77,27 @@ def pack_triangle_lights(meshes: list[Mesh], textures: PackedTextures) -> Triang
     both = np.array([each.material.double_sided for each in meshes], bool)[mesh[own]]
     records, groups = _packed(corners[begins], whole[begins], emission[mesh[own]], around[begins], both)
     records["texture"], records["primitive"] = texture[mesh[own]], own
-    return TriangleLights(records, groups, light)
+    if placements is not None and (place[mesh[own]] >= 0).any():
+        groups = _swept(groups, place[mesh[own]], placements)
+    return TriangleLights(records, groups, light, place[mesh[own]].astype(np.int32))
+
+
+def _swept(groups: LightGroups, place: Integers, placements: PackedInstances) -> LightGroups:
+    """Return the bounds of n lights, of which those with a place (n,) of at least 0 move: they are bounded as if they
+    emitted in all directions, with the larger one of the areas at both ends."""
+    assert placements.motion is not None
+    moving = place >= 0
+    motion = placements.motion.of(np.searchsorted(placements.moving, place[moving]))
+    low, high = groups.low.copy(), groups.high.copy()
+    low[moving], high[moving] = motion.boxes(np.stack([groups.low, groups.high], axis=1)[moving])
+    axis, cos_cone, radius, intensity = (
+        each.copy() for each in (groups.axis, groups.cos_cone, groups.radius, groups.intensity)
+    )
+    axis[moving], cos_cone[moving] = 0, -1
+    radius[moving] = np.linalg.norm(high - low, axis=1)[moving] / 2
+    grown = [np.abs(np.linalg.det(motion.at(s)[..., :3])) ** (2 / 3) for s in (0.0, 1.0)]
+    intensity[moving] *= np.maximum(*grown)
+    return LightGroups(low, high, radius, axis, cos_cone, intensity, groups.cos_reach)
 
 
 def _fades(mesh: Mesh) -> bool:
