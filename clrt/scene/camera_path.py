@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import fields, replace
 from typing import Any, get_args
 
@@ -15,6 +15,7 @@ from .fields.keywords import with_known_keywords
 from .geometry.transform import rotation, transform_light, translation
 from .model import Camera, Scene
 from .model_pose import posed
+from .pose_motion import moving_between
 from .sky.sky import moving_sky, with_sky
 from .splines import Doubles, smooth
 
@@ -44,7 +45,8 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps, turns: Turn
 def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
     """Return the number and the static scene of all frames, or of the `chosen` ones.
 
-    If neither a model nor the sun moves, the scenes differ in their camera alone. Raises SceneError if the scene has no
+    If neither a model nor the sun moves, the scenes differ in their camera alone. If the camera's shutter is open for
+    some time, it and what moves do so during the exposure (see `moving_between`). Raises SceneError if the scene has no
     animation or an invalid one, or if the sun is below the horizon in a frame; UsageError for an invalid number.
     """
     animation = scene.animation
@@ -62,11 +64,7 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
             raise UsageError(f"{scene.name} has no frame {number}; its frames are 0 to {count - 1}")
     if isinstance(animation, ModelAnimation):
         animation = SceneAnimation(models=(animation,), fps=animation.fps)
-    if isinstance(animation, SceneAnimation):
-        moving = _moving_frames(scene, animation, numbers)
-    else:
-        cameras = _cameras(scene.camera, animation, np.array(numbers, np.float64))
-        moving = ((number, replace(scene, camera=camera, animation=None)) for number, camera in zip(numbers, cameras))
+    moving: Iterator[tuple[int, Scene]] = zip(numbers, _exposures(scene, animation, np.array(numbers, np.float64)))
     if (sky := moving_sky(scene)) is not None:
         skies = [sky.after(number / animation.fps) for number in numbers]  # all are valid before the first is rendered
         moving = ((number, with_sky(still, sky, now)) for (number, still), now in zip(moving, skies))
@@ -85,16 +83,32 @@ def _lit_from(scene: Scene, camera: Camera, degrees: float) -> Scene:
     return replace(scene, environment=around, lights=[transform_light(light, turn) for light in scene.lights])
 
 
-def _moving_frames(scene: Scene, animation: SceneAnimation, numbers: Sequence[int]) -> Iterator[tuple[int, Scene]]:
+def _exposures(scene: Scene, animation: Animation | SceneAnimation, numbers: Doubles) -> Iterator[Scene]:
+    """Yield frames, in which everything moves if the camera's shutter is open for some time."""
+    camera = scene.camera
+    if not camera.exposure > 0:
+        return _stills(scene, animation, numbers)
+    starts = numbers + camera.shutter[0] * animation.fps
+    stills = _stills(scene, animation, starts), _stills(scene, animation, starts + camera.exposure * animation.fps)
+    return map(moving_between, *stills)
+
+
+def _stills(scene: Scene, animation: Animation | SceneAnimation, numbers: Doubles) -> Iterator[Scene]:
+    """Yield the static scenes of frames, between frames where a number is not whole."""
+    if isinstance(animation, SceneAnimation):
+        return _moving_stills(scene, animation, numbers)
+    return (replace(scene, camera=each, animation=None) for each in _cameras(scene.camera, animation, numbers))
+
+
+def _moving_stills(scene: Scene, animation: SceneAnimation, numbers: Doubles) -> Iterator[Scene]:
     """Yield the frames of moving models. A camera without an animation moves if it is a model's."""
-    times = animation.start + np.array(numbers, np.float64) / animation.fps
     path = None if animation.camera is None else replace(animation.camera, fps=animation.fps)
-    cameras = None if path is None else _cameras(scene.camera, path, np.array(numbers, np.float64))
-    for number, time in zip(numbers, times.tolist()):
+    cameras = None if path is None else _cameras(scene.camera, path, numbers)
+    for time in (animation.start + numbers / animation.fps).tolist():
         still = scene
         for model in animation.models:
             still = posed(still, model, time)
-        yield number, still if cameras is None else replace(still, camera=next(cameras))
+        yield still if cameras is None else replace(still, camera=next(cameras))
 
 
 def _problems(camera: Camera, animation: Animation | ModelAnimation | SceneAnimation) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from .animation import ModelAnimation
 from .lights import Light
 from .materials.material import Material
-from .model import Instance, Mesh, Model, Scene
+from .model import Camera, Instance, Mesh, Model, Scene
 
 Part = TypeVar("Part", bound=Mesh | Instance | Light)
 
@@ -26,16 +26,22 @@ def posed(scene: Scene, animation: ModelAnimation, seconds: float) -> Scene:
         name: model.cameras.get(name, camera) if base.cameras.get(name) is camera else camera
         for name, camera in scene.cameras.items()
     }
-    name = next((name for name, camera in base.cameras.items() if camera is scene.camera), None)
+    name = next((name for name, camera in base.cameras.items() if _is_shot_by(scene.camera, camera)), None)
+    moved = scene.camera if name is None else scene.camera.exposed_as(model.cameras.get(name, scene.camera))
     return replace(
         scene,
         meshes=_moved(scene.meshes, [*base.meshes, *base.emitters], [*model.meshes, *model.emitters], animation),
         instances=_moved(scene.instances, base.instances, model.instances, animation),
         lights=_moved(scene.lights, base.lights, model.lights, animation),
         cameras=cameras,
-        camera=scene.camera if name is None else model.cameras.get(name, scene.camera),
+        camera=moved,
         animation=None,
     )
+
+
+def _is_shot_by(camera: Camera, own: Camera) -> bool:
+    """Return whether a scene's camera is a model's own, maybe with a shutter."""
+    return camera is own or (camera.exposure > 0 and camera.exposed_as(own) == camera)
 
 
 def own_materials(model: Model) -> list[Material | None]:

@@ -22,7 +22,7 @@ from ...scene.geometry.transform import (
 )
 from ...scene.geometry.transform_faults import transform_faults
 from ...scene.materials.material_types import Material
-from ...scene.model import Instance, Model
+from ...scene.model import Instance, Model, Vector
 from .placement import Transform
 
 #: Maximum number of instances per table.
@@ -38,26 +38,35 @@ class Repeat(Transform):
 
 @dataclass(frozen=True, kw_only=True)
 class InstanceTable(Transform):
-    """Keys of [[instance]]; the entries of its `repeat` are read separately."""
+    """Keys of [[instance]]; the entries of its `repeat`, and its `motion`, are read separately."""
 
     mesh: Any  # a string; its problem lists the known names
     name: str | None = None
     material: str | None = None
     repeat: Any = ()
+    motion: Any = None
 
 
 class Copies(NamedTuple):
-    """Copies of a model's parts, one for each of `matrices` (n, 4, 4). material, name: replace the parts' own."""
+    """Copies of a model's parts, one for each of `matrices` (n, 4, 4). material, name: replace the parts' own. ends:
+    the matrices at the end of the exposure, the same if they do not move; pivot: the parts' point that moves in a
+    straight line."""
 
     matrices: NDArray[np.float64]
     material: Material | None
     name: str | None
+    ends: NDArray[np.float64]
+    pivot: Vector = (0.0, 0.0, 0.0)
 
     def of(self, parts: Sequence[Instance]) -> list[Instance]:
         """Return the copies of these parts."""
         return [
-            replace(moved(each, matrix), material=self.material or each.material, name=self.name or each.name)
-            for matrix in self.matrices
+            replace(
+                moved(each, matrix, end, self.pivot),
+                material=self.material or each.material,
+                name=self.name or each.name,
+            )
+            for matrix, end in zip(self.matrices, self.ends)
             for each in parts
         ]
 
@@ -89,20 +98,30 @@ class InstanceReader:
         repeats: Sequence[Repeat],
         material: Material | None,
         where: str,
+        end: InstanceTable | None = None,
+        pivot: Vector = (0.0, 0.0, 0.0),
     ) -> Copies:
-        """Return the copies of what the mesh shows; raises SceneError for invalid transforms."""
+        """Return the copies of what the mesh shows; raises SceneError for invalid transforms. end, pivot: the table at
+        the end of the exposure, and its pivot, if it has a motion."""
         if (count := prod(repeat.count for repeat in repeats)) > MOST_INSTANCES:
             raise SceneError(
                 f"{where}.repeat: makes {count} copies; reduce the counts to at most {MOST_INSTANCES} in all"
             )
-        matrices = table.to_world(where)[None]
-        for i, repeat in enumerate(repeats):
-            matrices = repeated(matrices, repeat.to_world(f"{where}.repeat[{i}]"), repeat.count)
-        for fault, found in transform_faults(matrices[:, :3]).items():
-            if found.any():
-                copy = f", of copy {found.argmax()}," if found.size > 1 else ""
-                raise SceneError(f"{where}: its transform{copy} {fault}; write a nonzero scale")
-        return Copies(matrices, material, table.name)
+        matrices = _matrices(table, repeats, where, where)
+        ends = matrices if end is None else _matrices(end, repeats, where, f"{where}.motion")
+        return Copies(matrices, material, table.name, ends, pivot)
+
+
+def _matrices(table: Transform, repeats: Sequence[Repeat], where: str, own: str) -> NDArray[np.float64]:
+    """Return the matrices of all copies; own: the name of the table with their transform."""
+    matrices = table.to_world(own)[None]
+    for i, repeat in enumerate(repeats):
+        matrices = repeated(matrices, repeat.to_world(f"{where}.repeat[{i}]"), repeat.count)
+    for fault, found in transform_faults(matrices[:, :3]).items():
+        if found.any():
+            copy = f", of copy {found.argmax()}," if found.size > 1 else ""
+            raise SceneError(f"{own}: its transform{copy} {fault}; write a nonzero scale")
+    return matrices
 
 
 def parts_to_copy(model: Model) -> list[Instance]:
@@ -119,19 +138,37 @@ def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray
     return np.concatenate(copies)
 
 
-def placed(model: Model, matrix: Matrix, material: Material | None, others: dict[str, Material]) -> Model:
+def placed(
+    model: Model,
+    matrix: Matrix,
+    material: Material | None,
+    others: dict[str, Material],
+    end: Matrix | None = None,
+    pivot: Vector = (0.0, 0.0, 0.0),
+) -> Model:
     """Apply an affine matrix to a model, without its animation. material: replaces its own; others: replacements by
-    their own names. The result's coordinates are the file's, as the matrix transforms them, and its center is 0."""
-    matrix = matrix @ translation(model.center)
+    their own names. The result's coordinates are the file's, as the matrix transforms them, and its center is 0. end:
+    the matrix at the end of the exposure, of a model that moves, whose meshes become instances; pivot: its point that
+    moves in a straight line."""
+    center = translation(model.center)
+    matrix, end = matrix @ center, None if end is None else end @ center
     meshes = [
-        transform_mesh(replace(mesh, material=others.get(mesh.material_name, material or mesh.material)), matrix)
-        for mesh in model.meshes
+        replace(mesh, material=others.get(mesh.material_name, material or mesh.material)) for mesh in model.meshes
     ]
     instances = [
-        replace(moved(each, matrix), material=others.get(each.mesh.material_name, material or each.material))
+        replace(each, material=others.get(each.mesh.material_name, material or each.material))
         for each in model.instances
     ]
     cameras = {name: transform_camera(camera, matrix) for name, camera in model.cameras.items()}
+    if end is None:
+        meshes = [transform_mesh(mesh, matrix) for mesh in meshes]
+    else:
+        instances = [*(Instance(mesh, name=mesh.name) for mesh in meshes), *instances]
+        own = center @ translation((-pivot[0], -pivot[1], -pivot[2]))
+        instances = [replace(each, pivot=(own @ _square(each.to_world))[:3]) for each in instances]
+        ends = {name: transform_camera(camera, end) for name, camera in model.cameras.items()}
+        meshes, cameras = [], {name: camera.moving_to(ends[name]) for name, camera in cameras.items()}
+    instances = [moved(each, matrix, end) for each in instances]
     lights = [transform_light(light, matrix) for light in model.lights]
     emitters = [transform_mesh(mesh, matrix) for mesh in model.emitters]
     return replace(
@@ -146,6 +183,21 @@ def placed(model: Model, matrix: Matrix, material: Material | None, others: dict
     )
 
 
-def moved(instance: Instance, matrix: Matrix) -> Instance:
-    """Return the instance transformed by a further affine matrix."""
-    return replace(instance, to_world=(matrix @ np.vstack([instance.to_world, [0.0, 0.0, 0.0, 1.0]]))[:3])
+def moved(instance: Instance, matrix: Matrix, end: Matrix | None = None, pivot: Vector = (0.0, 0.0, 0.0)) -> Instance:
+    """Return the instance transformed by a further affine matrix; end: the matrix at the end of the exposure, if it
+    changes; pivot: the point that this moves in a straight line, unless the instance has one of its own."""
+    to_world, last = _square(instance.to_world), _square(instance.to_world_end, instance.to_world)
+    further = matrix if end is None else end
+    if instance.to_world_end is None and np.array_equal(matrix, further):
+        return replace(instance, to_world=(matrix @ to_world)[:3])
+    around = instance.pivot
+    if instance.to_world_end is None and around is None:
+        around = (translation((-pivot[0], -pivot[1], -pivot[2])) @ to_world)[:3]
+    return replace(instance, to_world=(matrix @ to_world)[:3], to_world_end=(further @ last)[:3], pivot=around)
+
+
+def _square(matrix: NDArray[np.float64] | None, default: NDArray[np.float64] | None = None) -> Matrix:
+    """Return an affine matrix (3, 4) as (4, 4)."""
+    rows = default if matrix is None else matrix
+    assert rows is not None
+    return np.vstack([rows, [0.0, 0.0, 0.0, 1.0]])

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -33,7 +33,7 @@ Vertex = Annotated[int, Ge(0), Lt(2**31)]
 
 @dataclass(frozen=True, kw_only=True)
 class MeshTable(Transform):
-    """Keys of [[mesh]]."""
+    """Keys of [[mesh]]; its `motion` is read separately."""
 
     name: str | None = None
     file: str | None = None
@@ -54,6 +54,7 @@ class MeshTable(Transform):
     visible: bool = True
     up: Axis = "y"
     unit: Unit = "m"
+    motion: Any = None
 
     def to_world(self, where: str) -> Matrix:
         """Return the table's transform, after that of its axes and unit. Raises SceneError as that of `Transform`."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any, Self
 
 import numpy as np
 
@@ -33,3 +35,16 @@ class Transform:
         if self.matrix[3] != (0.0, 0.0, 0.0, 1.0):
             raise SceneError(f"{where}.matrix[3]: {show(self.matrix[3])} is not affine; write [0, 0, 0, 1]")
         return np.array(self.matrix, np.float64)
+
+    def moved(self, motion: Mapping[str, Any]) -> Self:
+        """Return the table with the transform keys of its `motion`, which replace its own; a matrix replaces all."""
+        keys = {key.name: key.default for key in fields(Transform)} if "matrix" in motion else {}
+        return replace(self, **{**keys, **{name: value for name, value in motion.items() if name != "pivot"}})
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionTable(Transform):
+    """Keys of a `motion`: the transform at the end of the exposure, and the point of what moves, before its transform,
+    that does so in a straight line."""
+
+    pivot: Vector = (0.0, 0.0, 0.0)

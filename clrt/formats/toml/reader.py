@@ -10,10 +10,12 @@ from typing import Any, TypeVar
 
 from ...errors import ObjectError, SceneError
 from ...scene.animation import Animation, Keyframe, SceneAnimation
+from ...scene.cameras import CameraEnd
 from ...scene.default_sky import SUN
 from ...scene.fields.field_types import field_problems, show, unknown, usable
 from ...scene.fields.validated import read_only
 from ...scene.geometry.instancing import meshes_by_id
+from ...scene.geometry.transform_faults import transform_faults
 from ...scene.lights import LIGHTS, Light
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
 from ...scene.materials.textures import WHITE, Texture
@@ -30,6 +32,7 @@ from ...scene.model import (
     Scene,
     Source,
     Sphere,
+    Vector,
 )
 from ...scene.model_pose import with_poses
 from ...scene.provenance import material_of, parts_of
@@ -40,10 +43,15 @@ from .built_in_environments import BUILT_IN
 from .instance_table import InstanceReader, InstanceTable, Repeat, placed
 from .mesh_table import MeshTable
 from .moving_mesh import MovingMesh, shown
+from .placement import MotionTable
 from .texture_table import TextureReader
 from .values import toml_key
 
 Kind = TypeVar("Kind")
+#: Keys of [camera] that may accompany the name of another one.
+SHUTTER = ("shutter", "rolling_shutter")
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+Placed = TypeVar("Placed", MeshTable, InstanceTable)
 Table = Mapping[str, Any]
 SECTIONS = (
     "camera",
@@ -142,6 +150,12 @@ class SceneReader:
         if not isinstance(values, dict):
             self.problems.append(f"{where}: {show(values)} is not a table; write its keys below [{where}]")
             return Camera()
+        if isinstance(end := values.get("end"), dict):
+            built = self._build(CameraEnd, end, f"{where}.end")
+            values = {**values, "end": built}
+        elif "end" in values:
+            self.problems.append(f"{where}.end: {show(end)} is not a table; write its keys below [{where}.end]")
+            values = {key: value for key, value in values.items() if key != "end"}
         if camera := self._build(Camera, values, where):
             return camera
         place = {key: values[key] for key in ("position", "look_at", "up") if key in values}
@@ -153,8 +167,13 @@ class SceneReader:
         """Return the camera of `cameras` that the table names."""
         name = str(values["name"])
         self.problems += camera_problems(name, self._cameras, "camera.name")
-        self.problems += [f"camera: has both a name and {key}; keep one of them" for key in values if key != "name"]
-        return self._cameras.get(name, Camera())
+        shutter = {key: value for key, value in values.items() if key in SHUTTER}
+        self.problems += [
+            f"camera: has both a name and {key}; keep one of them" for key in values if key not in {"name", *SHUTTER}
+        ]
+        named = self._cameras.get(name, Camera())
+        exposed = self._build(Camera, shutter, "camera") if shutter else None
+        return exposed.exposed_as(named) if exposed else named
 
     def _animation(self) -> Animation | None:
         """Return the camera's animation; None if there is none or if it is invalid."""
@@ -317,6 +336,11 @@ class SceneReader:
         if table or not field_problems(MeshTable, geometry, where):
             model = self._tried((table or MeshTable(**geometry)).read, self._path.parent, where)
             matrix = self._tried((table or MeshTable()).to_world, where)
+        last, pivot = self._motion(table, values, where)
+        end = None if last is None else self._tried(last.to_world, f"{where}.motion")
+        if end is not None and any(fault.any() for fault in transform_faults(end[None, :3]).values()):
+            self.problems.append(f"{where}.motion: its transform flattens the mesh; write a nonzero scale")
+            end = None
         if matrix is not None and not matrix[:3, :3].any():
             self.problems.append(f"{where}: its transform collapses it to a point; write a nonzero scale")
         if model is None or matrix is None:
@@ -325,7 +349,9 @@ class SceneReader:
             own = {mesh.material_name for mesh in (*model.meshes, *meshes_by_id(model.instances).values())}
             before = list(map(material_of, parts_of(model)))
             others = self._others(values, own, where)
-            place = partial(with_poses, model, partial(placed, matrix=matrix, material=material, others=others))
+            place = partial(
+                with_poses, model, partial(placed, matrix=matrix, material=material, others=others, end=end, pivot=pivot)
+            )
             model = self._made(place, where) or Model(meshes=[])
             self._source.meshes.append(Origin(self._located(values), parts_of(model), before))
         for name, camera in model.cameras.items():
@@ -336,6 +362,18 @@ class SceneReader:
         if model.animation is not None:
             self._moving.append((own_name, MovingMesh(model, model.animation, visible, lights)))
         return shown(model, visible, lights)
+
+    def _motion(self, table: Placed | None, values: Table, where: str) -> tuple[Placed | None, Vector]:
+        """Return the table at the end of the exposure, and its pivot; None if it has no motion or an invalid one."""
+        if table is None or "motion" not in values:
+            return None, ORIGIN
+        motion = values["motion"]
+        if not isinstance(motion, dict):
+            self.problems.append(f"{where}.motion: {show(motion)} is not a table; write {{ translate = [1, 0, 0] }}")
+            return None, ORIGIN
+        keys = _one_scale(motion)
+        built = self._build(MotionTable, keys, f"{where}.motion")
+        return (table.moved(usable(MotionTable, keys)), built.pivot) if built else (None, ORIGIN)
 
     def _located(self, values: Table) -> Table:
         """Return the table of a mesh with an absolute path."""
@@ -374,7 +412,8 @@ class SceneReader:
         table = self._build(InstanceTable, _one_scale(values), where)
         self.problems += self._instances.problems(values["mesh"], where) if "mesh" in values else []
         repeats = self._repeats(values.get("repeat", ()), f"{where}.repeat")
-        copies = table and self._tried(self._instances.read, table, repeats, material, where)
+        end, pivot = self._motion(table, values, where)
+        copies = table and self._tried(self._instances.read, table, repeats, material, where, end, pivot)
         parts = self._instances.parts(table) if table and copies else []
         made = (self._made(lambda: copies.of(parts), where) if copies else None) or []
         self._source.instances.append(Origin(values, made, [each.material for each in parts]))

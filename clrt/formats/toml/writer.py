@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scene.animation import Animation, SceneAnimation
+from ...scene.cameras import CameraEnd
 from ...scene.editing import free_name, materials_of
 from ...scene.fields.field_types import plain_value
 from ...scene.geometry.instancing import meshes_by_id
@@ -284,6 +285,9 @@ class _Writer:
                 f"name = {toml_value(each.name)}",
                 f"matrix = {toml_value(matrix)}",
             )
+            if each.to_world_end is not None:
+                end = tuple(map(tuple, [*each.to_world_end.tolist(), (0.0, 0.0, 0.0, 1.0)]))
+                yield f"motion = {toml_value({'matrix': end, **_pivot_key(each)})}"
             yield from () if each.material is None else (f"material = {toml_value(self._name_of(each.material))}",)
 
     def _spheres(self) -> Iterator[str]:
@@ -321,6 +325,8 @@ class _Writer:
                 yield f"{each.name} = {self._texture(value)}"
             elif isinstance(value, LightImage):
                 yield f"{each.name} = {self._light_image(value)}"
+            elif isinstance(value, CameraEnd):
+                yield f"{each.name} = {toml_value(value.changes)}"
             elif is_plain(value) and (each.name in TELLING or value != each.default):
                 yield f"{each.name} = {toml_value(value)}"
 
@@ -386,6 +392,14 @@ def _given(kind: type, record: Texture | LightImage) -> dict[str, Any]:
         for each in fields(kind)
         if each.name != "image" and getattr(record, each.name) != each.default
     }
+
+
+def _pivot_key(instance: Instance) -> dict[str, tuple[float, ...]]:
+    """Return the key of a moving instance's pivot, unless that is the mesh's origin."""
+    if instance.pivot is None:
+        return {}
+    point = np.linalg.solve(instance.pivot[:, :3], -instance.pivot[:, 3])
+    return {"pivot": tuple(point.tolist())} if point.any() else {}
 
 
 def _moves(table: Mapping[str, Any]) -> bool:
