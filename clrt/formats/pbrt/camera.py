@@ -12,6 +12,7 @@ from ...scene.model import Camera
 from ..scene_parts.camera_axes import lengths_of
 from ..scene_parts.notes import Notes
 from .entities import Entity
+from .shutter import Shutter
 from .tokens import Doubles
 
 #: Tolerance of a screen window's shape and place.
@@ -33,9 +34,17 @@ def mirror_of(camera: Entity) -> Doubles:
     return np.diag([1.0 if side @ (axes @ right) > 0 else -1.0, 1, 1])
 
 
+def exposed_camera(entity: Entity, size: tuple[int, int], mirror: Doubles, notes: Notes, shutter: Shutter) -> Camera:
+    """Read the camera for an image of this size, with its motion."""
+    start, end = shutter.poses(entity.to_world, entity.to_world_end)
+    poses = [replace(entity, to_world=pose) for pose in (start, end) if pose is not None]
+    camera, *last = [camera_of(each, size, mirror, notes) for each in poses]
+    return camera.moving_to(last[0]) if last else camera
+
+
 def camera_of(entity: Entity, size: tuple[int, int], mirror: Doubles, notes: Notes) -> Camera:
     """Read the camera for an image of this size. mirror: see `mirror_of`."""
-    entity.ignore(("shutteropen", "shutterclose", "hither", "yon"))
+    entity.ignore(("hither", "yon"))
     to_world = np.linalg.inv(entity.to_world)
     axes, place = mirror @ to_world[:3, :3], mirror @ to_world[:3, 3]
     across, upright, along = lengths_of(entity, axes, "its transformation")

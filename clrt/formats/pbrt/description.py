@@ -54,16 +54,17 @@ class ShapeUse(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """An ObjectInstance. place: its line."""
+    """An ObjectInstance. place: its line; to_world_end: as that of an Entity."""
 
     name: str
     to_world: Doubles
     place: str
+    to_world_end: Doubles | None = None
 
 
 @dataclass
 class Description:
-    """old: whether the file is of v3 or before."""
+    """old: whether the file is of v3 or before; times: of the transformations at the start and at the end."""
 
     files: Files
     single: dict[str, Entity] = field(default_factory=dict)
@@ -74,7 +75,7 @@ class Description:
     materials: dict[str, Entity] = field(default_factory=dict)
     media: dict[str, Entity] = field(default_factory=dict)
     textures: dict[tuple[str, str], Entity] = field(default_factory=dict)
-    moving: str = ""
+    times: tuple[float, float] = (0.0, 1.0)
     old: bool = False
 
     def entity(self, tag: str) -> Entity:
@@ -99,8 +100,9 @@ class State:
     inside: str = ""
     outside: str = ""
     space: str = "srgb"
-    #: Whether transformations are those of the end of the shutter's time alone, which are not used.
-    at_end: bool = False
+    #: The transformation at the end of its time, if that is another one, and which of the two are changed.
+    to_world_end: Doubles | None = None
+    active: str = "All"
     defaults: dict[str, dict[str, Parameter]] = field(default_factory=dict)
 
 
@@ -114,22 +116,21 @@ class _Interpreter:
         self._found = Description(files)
         self._state = State()
         self._saved: list[tuple[str, State]] = []
-        self._systems: dict[str, Doubles] = {}
+        self._systems: dict[str, tuple[Doubles, Doubles | None]] = {}
         self._object: str | None = None
-        self._transforms: dict[str, Callable[[Directive], Doubles]] = {
-            "Translate": lambda each: self._state.to_world @ translation(_triple(each.numbers)),
-            "Scale": lambda each: self._state.to_world @ scaling(_triple(each.numbers)),
-            "Rotate": lambda each: self._state.to_world @ axis_rotation(_triple(each.numbers[1:]), each.numbers[0]),
-            "LookAt": lambda each: self._state.to_world @ _world_to_camera(each),
-            "Identity": lambda each: np.eye(4),
-            "Transform": _matrix,
-            "ConcatTransform": lambda each: self._state.to_world @ _matrix(each),
-            "CoordSysTransform": lambda each: self._system(each),
+        self._transforms: dict[str, Callable[[Doubles, Directive], Doubles]] = {
+            "Translate": lambda before, each: before @ translation(_triple(each.numbers)),
+            "Scale": lambda before, each: before @ scaling(_triple(each.numbers)),
+            "Rotate": lambda before, each: before @ axis_rotation(_triple(each.numbers[1:]), each.numbers[0]),
+            "LookAt": lambda before, each: before @ _world_to_camera(each),
+            "Identity": lambda before, each: np.eye(4),
+            "Transform": lambda before, each: _matrix(each),
+            "ConcatTransform": lambda before, each: before @ _matrix(each),
         }
 
     def description(self, directives: Iterable[Directive]) -> Description:
         for each in directives:
-            if each.name in self._transforms:
+            if each.name in self._transforms or each.name == "CoordSysTransform":
                 self._transform(each)
             else:
                 HANDLED[each.name](self, each)
@@ -139,22 +140,35 @@ class _Interpreter:
         return self._found
 
     def _transform(self, each: Directive) -> None:
-        if self._state.at_end:
-            self._found.moving = self._found.moving or each.place
-        else:
-            with np.errstate(all="ignore"):
-                to_world = self._transforms[each.name](each)
-                self._state.to_world = to_world / to_world[3, 3]
-            last = np.abs(to_world[3] - (0, 0, 0, to_world[3, 3])).max()
-            if not np.isfinite(self._state.to_world).all() or last > AFFINE * abs(to_world[3, 3]):
-                raise SceneError(f"{each.place}: {each.name} is not affine or not finite; write an affine one")
-            self._state.to_world[3] = (0, 0, 0, 1)
+        state = self._state
+        start, end = state.to_world, state.to_world if state.to_world_end is None else state.to_world_end
+        if state.active != "EndTime":
+            start = self._transformed(start, each, 0)
+        if state.active != "StartTime":
+            end = self._transformed(end, each, 1)
+        state.to_world, state.to_world_end = start, None if np.array_equal(start, end) else end
 
-    def _system(self, each: Directive) -> Doubles:
+    def _transformed(self, before: Doubles, each: Directive, time: int) -> Doubles:
+        """Return the transformation at the start (0) or at the end (1) after a directive."""
+        with np.errstate(all="ignore"):
+            made = (
+                self._system(each)[time]
+                if each.name == "CoordSysTransform"
+                else self._transforms[each.name](before, each)
+            )
+            to_world = made / made[3, 3]
+        last = np.abs(made[3] - (0, 0, 0, made[3, 3])).max()
+        if not np.isfinite(to_world).all() or last > AFFINE * abs(made[3, 3]):
+            raise SceneError(f"{each.place}: {each.name} is not affine or not finite; write an affine one")
+        to_world[3] = (0, 0, 0, 1)
+        return np.asarray(to_world, np.float64)
+
+    def _system(self, each: Directive) -> tuple[Doubles, Doubles]:
         name = each.words[0]
         if name not in self._systems:
             raise SceneError(f'{each.place}: the coordinate system "{name}" is not defined; define it')
-        return self._systems[name]
+        start, end = self._systems[name]
+        return start, start if end is None else end
 
     def _entity(self, each: Directive, name: str = "", kind: str = "", value_type: str = "") -> Entity:
         kind = kind or each.words[-1]
@@ -173,6 +187,7 @@ class _Interpreter:
             each.file,
             frozenset(defaults.keys() - each.parameters.keys()),
             self._known(each.parameters),
+            to_world_end=self._state.to_world_end,
         )
 
     def _known(self, parameters: dict[str, Parameter]) -> dict[tuple[str, str], Entity]:
@@ -188,10 +203,13 @@ class _Interpreter:
         tag = {"SurfaceIntegrator": "Integrator"}.get(each.name, each.name)
         self._found.single[tag] = replace(self._entity(each), tag=tag)
         if tag == "Camera":
+            poses = self._state.to_world, self._state.to_world_end
             with np.errstate(all="ignore"):
-                if abs(np.linalg.det(self._state.to_world)) < 1e-300:
+                if any(pose is not None and abs(np.linalg.det(pose)) < 1e-300 for pose in poses):
                     raise SceneError(f"{each.place}: the camera's transformation is singular; write another")
-                self._systems["camera"] = np.asarray(np.linalg.inv(self._state.to_world), np.float64)
+                start, end = (None if pose is None else np.asarray(np.linalg.inv(pose), np.float64) for pose in poses)
+            assert start is not None
+            self._systems["camera"] = start, end
 
     def shape(self, each: Directive) -> None:
         """Note a shape, of the scene or of an object."""
@@ -259,7 +277,9 @@ class _Interpreter:
             raise SceneError(f"{each.place}: {each.name} ends what did not begin; remove it")
         _, saved = self._saved.pop()
         if each.name == "TransformEnd":
-            self._state = replace(self._state, to_world=saved.to_world, at_end=saved.at_end)
+            self._state = replace(
+                self._state, to_world=saved.to_world, to_world_end=saved.to_world_end, active=saved.active
+            )
         else:
             self._state = saved
 
@@ -282,13 +302,13 @@ class _Interpreter:
         """Note an instance."""
         if self._object is not None:
             raise SceneError(f"{each.place}: ObjectInstance is inside an object; write it outside")
-        self._found.instances.append(Placed(each.words[0], self._state.to_world, each.place))
+        self._found.instances.append(Placed(each.words[0], self._state.to_world, each.place, self._state.to_world_end))
 
     def world(self, each: Directive) -> None:
         """Begin the world, whose coordinates those of the camera were relative to."""
-        self._state.to_world = np.eye(4)
-        self._state.at_end = False
-        self._systems["world"] = np.eye(4)
+        self._state.to_world, self._state.to_world_end = np.eye(4), None
+        self._state.active = "All"
+        self._systems["world"] = np.eye(4), None
 
     def reverse(self, each: Directive) -> None:
         """Turn shapes inside out."""
@@ -296,11 +316,16 @@ class _Interpreter:
 
     def system(self, each: Directive) -> None:
         """Name the coordinate system."""
-        self._systems[each.words[0]] = self._state.to_world
+        self._systems[each.words[0]] = self._state.to_world, self._state.to_world_end
 
     def active(self, each: Directive) -> None:
         """Select the transformations of the start or the end of the shutter's time."""
-        self._state.at_end = each.words[0] == "EndTime"
+        self._state.active = each.words[0]
+
+    def times(self, each: Directive) -> None:
+        """Set the times of the transformations at the start and at the end."""
+        start, end = each.numbers
+        self._found.times = float(start), float(end)
 
     def media(self, each: Directive) -> None:
         """Set the media inside and outside shapes."""
@@ -328,7 +353,7 @@ HANDLED: dict[str, Callable[[_Interpreter, Directive], None]] = {
     ),
     **dict.fromkeys(("AttributeBegin", "TransformBegin"), _Interpreter.begin),
     **dict.fromkeys(("AttributeEnd", "TransformEnd"), _Interpreter.end),
-    **dict.fromkeys(("Accelerator", "VolumeIntegrator", "Renderer", "Option", "TransformTimes"), _Interpreter.ignore),
+    **dict.fromkeys(("Accelerator", "VolumeIntegrator", "Renderer", "Option"), _Interpreter.ignore),
     "Shape": _Interpreter.shape,
     "LightSource": _Interpreter.light,
     "AreaLightSource": _Interpreter.area,
@@ -347,6 +372,7 @@ HANDLED: dict[str, Callable[[_Interpreter, Directive], None]] = {
     "ReverseOrientation": _Interpreter.reverse,
     "CoordinateSystem": _Interpreter.system,
     "ActiveTransform": _Interpreter.active,
+    "TransformTimes": _Interpreter.times,
     "ColorSpace": _Interpreter.space,
     "Volume": _Interpreter.volume,
 }

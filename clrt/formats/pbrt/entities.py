@@ -65,7 +65,8 @@ class Files:
 @dataclass(eq=False)
 class Entity:
     """A directive with parameters. tag: "Shape"; kind: "sphere"; name: of a texture or a named material; place: its
-    line; to_world: the transformation then in effect; space: the color space of its colors.
+    line; to_world: the transformation then in effect; to_world_end: that at its end, if that is another one; space: the
+    color space of its colors.
 
     Parameters that were read are in `used`, so that a reader can report the others; `inherited` ones come from
     Attribute directives. textures: those that its parameters name, as far as they were defined before it.
@@ -84,6 +85,7 @@ class Entity:
     inherited: frozenset[str] = frozenset()
     textures: Mapping[tuple[str, str], Entity] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
+    to_world_end: Doubles | None = None
 
     @property
     def where(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -13,7 +14,7 @@ from ...scene.lights import Light
 from ...scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from ..referenced_files import name_of
 from ..scene_parts.notes import Notes, UnsupportedError
-from .camera import camera_of, mirror_of
+from .camera import exposed_camera, mirror_of
 from .description import Description, describe
 from .directives import Reader
 from .entities import Entity
@@ -23,6 +24,7 @@ from .material_types import TYPES, unknown
 from .materials import MaterialReader
 from .render_settings import exposure, settings_of
 from .shapes import ShapeReader
+from .shutter import Shutter
 from .spectra import Spectra
 from .textures import TextureReader
 from .tokens import Doubles
@@ -63,24 +65,25 @@ class _Converter:
         spectra = Spectra(description.old, self._tried(lambda: exposure(description)) or 1.0)
         textures = TextureReader(spectra, notes, description.old)
         materials = MaterialReader(description, textures, notes, TYPES, unknown)
-        shapes = ShapeReader(description, textures, materials, notes, mirror)
-        if description.moving:
-            moving = Entity("ActiveTransform", "EndTime", description.moving)
-            what = "motion is not supported"
-            self._tried(lambda: notes.instead(moving, what, "leave it out", "the transformation at the start is used"))
+        shutter = self._tried(lambda: Shutter.of(camera_entity, description.times)) or Shutter(0, 1, (0, 1))
+        shapes = ShapeReader(description, textures, materials, notes, mirror, shutter)
+        for each in description.lights:
+            self._tried(lambda each=each: self._note_motion(each))  # type: ignore[misc]
         if "Volume" in description.single:
             volume = description.entity("Volume")
             volume.ignore()
             self._tried(lambda: notes.instead(volume, "media are not supported", "leave it out", "it is left out"))
         parts = self._parts(shapes)
         lights, sky = self._lights(spectra, mirror)
-        camera = self._tried(lambda: camera_of(camera_entity, settings.size, mirror, notes)) or Camera()
+        camera = self._tried(lambda: exposed_camera(camera_entity, settings.size, mirror, notes, shutter)) or Camera()
         if not self._problems:
             self._note_unread()
         if self._features:
             raise UnsupportedError(self._problems, self._features)
         if self._problems:
             raise SceneError(self._problems)
+        if camera.end or any(isinstance(each, Instance) and each.to_world_end is not None for each in parts):
+            camera = replace(camera, shutter=(shutter.opens, shutter.closes))
         scene = Scene(
             meshes=[each for each in parts if isinstance(each, Mesh)],
             spheres=[each for each in parts if isinstance(each, Sphere)],
@@ -92,6 +95,11 @@ class _Converter:
             name=name,
         )
         return PbrtScene(scene, notes.differences)
+
+    def _note_motion(self, source: Entity) -> None:
+        if source.to_world_end is not None:
+            stand_in = "the transformation at the start is used"
+            self._notes.instead(source, "motion of lights is not supported", "leave it out", stand_in)
 
     def _parts(self, shapes: ShapeReader) -> list[Mesh | Sphere | Instance]:
         description = self._description

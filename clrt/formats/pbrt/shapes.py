@@ -21,6 +21,7 @@ from .entities import Entity
 from .materials import MaterialReader
 from .meshes import facing, patches, ply, subdivision, triangles, with_coordinates
 from .quadrics import cylinder, disk, is_whole_sphere, sphere
+from .shutter import Shutter
 from .textures import TextureReader
 from .tokens import Doubles
 
@@ -41,7 +42,7 @@ Part = Mesh | Sphere
 
 
 class ShapeReader:
-    """Reader for the shapes of one scene. mirror: (3, 3), from pbrt's world to clrt's."""
+    """Reader for the shapes of one scene. mirror: (3, 3), from pbrt's world to clrt's; shutter: the camera's."""
 
     def __init__(
         self,
@@ -50,37 +51,65 @@ class ShapeReader:
         materials: MaterialReader,
         notes: Notes,
         mirror: Doubles,
+        shutter: Shutter,
     ) -> None:
         self._description = description
         self._textures = textures
         self._materials = materials
         self._notes = notes
+        self._shutter = shutter
         self._mirror = np.eye(4)
         self._mirror[:3, :3] = mirror
         self._round = 0
         self._count = 0
         self._objects: dict[str, list[tuple[ShapeUse, Part]]] = {}
 
-    def parts(self, use: ShapeUse) -> Iterator[Part]:
+    def parts(self, use: ShapeUse) -> Iterator[Part | Instance]:
         """Yield what a shape renders."""
-        return self._placed(use, self._mirror)
+        shape = use.shape
+        if shape.to_world_end is None:
+            yield from self._placed(use, self._mirror)
+            return
+        start, end = self._shutter.poses(shape.to_world, shape.to_world_end)
+        moved = use._replace(shape=replace(shape, to_world=start, to_world_end=end))
+        for part in self._placed(moved, self._mirror):
+            yield part if end is None else self._moving(part, start, end)
+
+    def _moving(self, part: Part, start: Doubles, end: Doubles) -> Instance:
+        """Return a mesh in the world, at the start, that moves with the transformation of its shape."""
+        assert isinstance(part, Mesh)
+        try:
+            own = np.asarray(np.linalg.inv(self._mirror @ start), np.float64)
+        except np.linalg.LinAlgError:
+            raise SceneError(f"{part.name}: its transformation is singular and it moves; write another") from None
+        return Instance(part, name=part.name, to_world_end=self._mirror @ end @ own, pivot=own)
 
     def object_parts(self, name: str) -> None:
         """Read the shapes of an object once, before its instances."""
         uses = self._description.objects[name]
+        for use in uses:
+            if use.shape.to_world_end is not None:
+                what, stand_in = "motion inside an object is not supported", "it is left out"
+                self._notes.instead(use.shape, what, "move the instance instead", stand_in)
+                use.shape.to_world_end = None
         self._objects[name] = [(use, part) for use in uses for part in self._placed(use, np.eye(4))]
 
     def instances(self, placed: Placed) -> Iterator[Instance | Part]:
         """Yield what an instance renders. Raises SceneError for an undefined object."""
         if placed.name not in self._description.objects:
             raise SceneError(f'{placed.place}: ObjectInstance "{placed.name}": the object is not defined; define it')
-        to_world = self._mirror @ placed.to_world
+        start, end = self._shutter.poses(placed.to_world, placed.to_world_end)
+        to_world, last = self._mirror @ start, None if end is None else self._mirror @ end
         for use, part in self._objects.get(placed.name, []):
             self._count += 1
             if self._count > MOST_INSTANCES:
                 raise SceneError(f"{placed.place}: the scene has more than {MOST_INSTANCES} instances; render fewer")
             if isinstance(part, Mesh):
-                yield Instance(part, to_world, name=placed.name)
+                yield Instance(part, to_world, name=placed.name, to_world_end=last)
+                continue
+            if last is not None:
+                mesh = self._tessellated(use, part.material)
+                yield Instance(mesh, to_world, name=placed.name, to_world_end=last)
                 continue
             place = np.eye(4)
             place[:3, :3] *= part.radius
@@ -89,7 +118,7 @@ class ShapeReader:
             if ball is not None:
                 yield ball
             else:
-                yield transform_mesh(self._tessellated(use, part.material), self._mirror @ placed.to_world)
+                yield transform_mesh(self._tessellated(use, part.material), to_world)
 
     def _placed(self, use: ShapeUse, mirror: Doubles) -> Iterator[Part]:
         entity = use.shape
@@ -106,7 +135,7 @@ class ShapeReader:
             return
         to_world = entity.to_world
         flips = use.reversed ^ (entity.kind in QUADRICS and bool(np.linalg.det(to_world[:3, :3]) < 0))
-        if entity.kind == "sphere" and is_whole_sphere(entity):
+        if entity.kind == "sphere" and is_whole_sphere(entity) and entity.to_world_end is None:
             inwards = flips and (use.area is not None or "TRANSMISSION" in material.features())
             radius = abs(entity.number("radius", 1.0))
             place = mirror @ to_world @ np.diag([radius, radius, radius, 1])
