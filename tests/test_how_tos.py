@@ -20,6 +20,7 @@ PAGES = {
     "transparent-background": (2, ("product.png", "product.exr")),
     "light-measurements": (2, ()),
     "bake": (3, ("light.exr", "light.png", "light.json", "occlusion.png", "table.exr")),
+    "motion-blur": (1, ("spot.png",)),
     "sky": (2, ("noon.png", "outside.toml", "hour_09.png", "hour_21.png")),
     "light-groups": (2, ("night.exr", "moonlit.png", "dimmed.png")),
     "dataset": (4, ("view_0003.exr", "spot/transforms.json", "spot/images/view_00003.png")),
