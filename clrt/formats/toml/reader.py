@@ -349,10 +349,8 @@ class SceneReader:
             own = {mesh.material_name for mesh in (*model.meshes, *meshes_by_id(model.instances).values())}
             before = list(map(material_of, parts_of(model)))
             others = self._others(values, own, where)
-            place = partial(
-                with_poses, model, partial(placed, matrix=matrix, material=material, others=others, end=end, pivot=pivot)
-            )
-            model = self._made(place, where) or Model(meshes=[])
+            at = partial(placed, matrix=matrix, material=material, others=others, end=end, pivot=pivot)
+            model = self._made(partial(with_poses, model, at), where) or Model(meshes=[])
             self._source.meshes.append(Origin(self._located(values), parts_of(model), before))
         for name, camera in model.cameras.items():
             self._source.cameras.setdefault(name, self._cameras.setdefault(name, camera))
