@@ -58,6 +58,10 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "compare image": lambda image: clrt.compare(image, np.ones((8, 8, 3), np.float32)),
     "compare reference": lambda image: clrt.compare(np.ones((8, 8, 3), np.float32), image),
     "render checkpoint": lambda new_ck: clrt.render(clrt.Scene(), spp=1, size=(8, 8), checkpoint=new_ck),
+    "relight image": lambda new_exr: (
+        clrt.render(clrt.Scene(spheres=[clrt.Sphere()]), spp=1, size=(8, 8), aovs="light_groups").save(new_exr)
+        or clrt.relight(new_exr, {})
+    ),
     "Image.save path": lambda new_png: clrt.Image(np.ones((8, 8, 3), np.float32)).save(new_png),
     "Renderer checkpoint": lambda new_ck: list(
         clrt.Renderer(clrt.Scene(spheres=[clrt.Sphere()]), spp=1, size=(8, 8), checkpoint=new_ck).passes()

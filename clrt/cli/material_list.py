@@ -9,7 +9,7 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from ..scene.fields.field_types import show
-from ..scene.fields.limits import Ge, Gt, Le, Lt
+from ..scene.fields.limits import Characters, Ge, Gt, Le, Lt
 from ..scene.materials.material import SHARED
 from ..scene.materials.material_types import MATERIALS, Material
 from ..scene.materials.presets import CONDUCTORS, F0_PRESETS
@@ -80,6 +80,8 @@ def _values(hint: Any) -> Iterator[str]:
     elif origin is tuple:
         number = next(_values(parts[0])).removeprefix("a number")
         yield f"{len(parts)} numbers{', each' * bool(number)}{number}"
+    elif origin is Annotated and isinstance(parts[1], Characters):
+        yield f"text of {parts[1].names}"
     elif origin is Annotated:
         words = {type(limit): f"{limit.bound:g}" for limit in parts[1:]}
         limits = (

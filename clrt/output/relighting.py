@@ -12,12 +12,14 @@ from ..errors import SceneError, UsageError, did_you_mean
 from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from ..formats.images.image_reader import read_layers, read_named_layers
+from ..scene.fields.keywords import with_known_keywords
 from .image import Image
 
 FloatArray = NDArray[np.float32]
 Factor = float | Sequence[float]
 
 
+@with_known_keywords
 @with_default_errors
 def relight(image: Image | StrPath, factors: Mapping[str, Factor]) -> Image:
     """Return the image as if the light of each group in `factors` were so many times as bright.

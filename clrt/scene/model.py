@@ -141,10 +141,10 @@ class Instance(Editable):
             matrix = getattr(self, name)
             if matrix is None and name != "to_world":
                 continue
-            if np.shape(matrix) != (3, 4):
+            if not isinstance(matrix, np.ndarray) or matrix.shape != (3, 4):
+                shape = f"has shape {matrix.shape}" if isinstance(matrix, np.ndarray) else f"is {show(matrix)}"
                 return [
-                    f": {name} has shape {np.shape(matrix)}; write a numpy array of shape (3, 4), or (4, 4) with the "
-                    "last row 0, 0, 0, 1"
+                    f": {name} {shape}; write a numpy array of shape (3, 4), or (4, 4) with the last row 0, 0, 0, 1"
                 ]
             if faults := placement_faults(matrix, self.mesh.vertices):
                 rows = show(tuple(tuple(row) for row in matrix.tolist()))

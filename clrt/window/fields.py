@@ -87,7 +87,7 @@ def edit(label: str, hint: Any, value: Any, step: float) -> Any:
         return choose(label, parts, value)
     if origin is tuple:
         return _edit_tuple(label, parts, value, step)
-    widget: Callable[[str, Any], tuple[bool, Any]] = _PLAIN.get(hint, partial(_number, hint, step))
+    widget: Callable[[str, Any], tuple[bool, Any]] = _PLAIN.get(_base(hint), partial(_number, hint, step))
     changed, new = widget(label, value)
     return new if changed else value
 

@@ -239,7 +239,7 @@ def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> 
         (["--frames", "0", "-o", "a.gif", "--fps", "0.0015"], 2, "666.667 s are more than the 655.35"),
         (["--turntable", "4", "-o", "a.gif", "--fps", "nan"], 2, "fps is nan; it must be above 0 and finite"),
         (["--turntable", "4", "-o", "a.gif", "--fps", "inf"], 2, "fps is inf; it must be above 0 and finite"),
-        (["--frames", "all", "--fps", "nan"], 3, "animation.fps: nan is not a finite number"),
+        (["--frames", "all", "--fps", "nan"], 3, "Animation.fps: nan is not a finite number"),
         (["--frames", "all", "--fps", "1e12"], 3, "frames, more than 1000000; check the times"),
         (["--frames", "0", "-o", "no/a.png"], 6, "does not exist"),
     ],

@@ -75,7 +75,8 @@ def test_records_keep_the_rules(name: str) -> None:
     members = [dtype[field] for field in dtype.names or ()]
     assert sum(member.itemsize for member in members) == dtype.itemsize
     assert all(place % member.base.itemsize == 0 for member, place in zip(members, offsets(dtype)))
-    alone = {"SKY_STEP": 8, "FILTER": 4, "LIGHT_PLACE": 4, "TEXEL": 4, "LINEAR": 4}
+    numbers = dict.fromkeys(("EMITTER_GROUP", "FILTER", "LIGHT_PLACE", "LIGHT_PLACEMENT", "LINEAR", "MOTION_NUMBER"), 4)
+    alone = {**numbers, "SKY_STEP": 8, "TEXEL": 4}
     assert dtype.itemsize % alone.get(name.removeprefix("records_"), 16) == 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -393,18 +394,17 @@ def test_what_cannot_be_rendered(device: Device) -> None:
     """Each ends in one message with its remedy."""
     moving, scene = random_scene(np.random.default_rng(6), "rigid")
     scene = replace(scene, instances=moving)
-    mirrored = replace(moving[0], to_world_end=moving[0].to_world * [[-1], [1], [1]])
-    cases = {
-        "closes before it opens": replace(scene, camera=replace(scene.camera, shutter=(1, 0))),
-        "camera.end.look_at: .* own position": replace(
-            scene, camera=replace(scene.camera, end=CameraEnd(look_at=(1, 1.5, 5)))
-        ),
-        "does not support motion blur": replace(scene, render=replace(scene.render, integrator="raster")),
-        "mirror both or neither": replace(scene, instances=[mirrored]),
-        "to_world_end has shape": replace(scene, instances=[replace(moving[0], to_world_end=np.eye(3))]),
+    mirrored = moving[0].to_world * [[-1], [1], [1]]
+    cases: dict[str, Callable[[], object]] = {
+        "Camera.shutter: .* closes before it opens": lambda: replace(scene.camera, shutter=(1, 0)),
+        "Camera.end.look_at: .* own position": lambda: replace(scene.camera, end=CameraEnd(look_at=(1, 1.5, 5))),
+        "does not support motion blur": lambda: replace(scene, render=replace(scene.render, integrator="raster")),
+        "mirror both or neither": lambda: replace(moving[0], to_world_end=mirrored),
+        "to_world_end has shape": lambda: replace(moving[0], to_world_end=np.eye(3)),
+        r"pivot is \[\[1.0\], \[\]\]": lambda: replace(moving[0], pivot=[[1.0], []]),  # type: ignore[arg-type]
     }
-    for message, wrong in cases.items():
+    for message, make in cases.items():
         with pytest.raises(clrt.SceneError, match=message):
-            compile_scene(wrong, choices(device))
+            make()
     with pytest.raises(clrt.UsageError, match="view 0 has motion blur"):
         clrt.render_views(scene, [scene.camera], ["flow"], device=device.info.index)

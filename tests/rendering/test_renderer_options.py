@@ -28,8 +28,9 @@ from clrt.rendering.renderer_options import (
 )
 from clrt.scene.model import RenderSettings, Scene
 
-#: Fields of settings objects that are not keywords: `tests` is made of HitTests, the others follow from the AOVs.
-NO_KEYWORDS = {"tests", "direct_light", "light_groups"}
+#: Fields of settings objects that are not keywords of these: `tests` is made of HitTests, `error` is that of the stop
+#: conditions, the others follow from the AOVs.
+NO_KEYWORDS = {"tests", "error", "direct_light", "light_groups"}
 #: Names that the keywords' types contain, which are known only where Renderer is.
 KNOWN = {"Renderer": Renderer}
 CALLS: dict[str, Callable[..., Any]] = {"Renderer": clrt.Renderer, "render": clrt.render, "animate": clrt.animate}

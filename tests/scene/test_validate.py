@@ -101,7 +101,7 @@ MISTAKES: dict[str, tuple[Callable[[Scene], object], str]] = {
     "instances": (place(*[np.full((3, 4), np.nan)] * 3), "is not finite; repair it"),
     "instance shape": (place(np.eye(3)), 'instance "instance": to_world has shape (3, 3); write a numpy array of'),
     "instance affine": (place(np.ones((4, 4))), "to_world has shape (4, 4); write a numpy array of shape (3, 4), or"),
-    "instance text": (place("up"), "to_world has shape (); write a numpy array"),
+    "instance text": (place("up"), 'to_world is "up"; write a numpy array'),
     "instance huge": (place(1e38 * np.eye(3, 4), mesh=TRIANGLE), "moves the mesh outside the range of float32"),
     "instance mesh": (
         place(np.eye(3, 4), mesh=3),
