@@ -77,14 +77,18 @@ class Draws:
 
     def record(self, kind: type[Drawn], **given: Any) -> Drawn:
         """Return a dataclass with random fields, except those given."""
+        return kind(**self.values(kind, **given))
+
+    def values(self, kind: type, **given: Any) -> dict[str, Any]:
+        """Return random values for the fields of a dataclass, except those given, and these."""
         hints = get_type_hints(kind, include_extras=True)
         specular = issubclass(kind, Material) and kind().is_specular
         drawn = {
             field.name: self._field(hints[field.name], field, specular)
-            for field in fields(kind)  # type: ignore[arg-type]
+            for field in fields(kind)
             if field.name not in given
         }
-        return kind(**given, **drawn)
+        return given | drawn
 
     def material(self, kind: type[Material], **given: Any) -> Material:
         """Return a random material of a type whose fields do not conflict."""

@@ -106,7 +106,7 @@ class _Stage:
         height, strength = draws.between(3.4 if draws.moderate else 2.0, 4.4), draws.decades(-0.5, 1.0)
         red, green, blue = (strength * part for part in draws.vector(0.2, 1.0))
         towards = draws.between(-0.8, 0.8) - x, -height, draws.between(-0.8, 0.8) - z
-        light = draws.record(
+        drawn = draws.values(
             kind,
             **fields_of(
                 kind,
@@ -120,9 +120,9 @@ class _Stage:
                 },
             ),
         )
-        if isinstance(light, SpotLight) and light.inner_degrees >= light.outer_degrees:
-            return replace(light, inner_degrees=0.9 * light.outer_degrees)
-        return light
+        if kind is SpotLight:
+            drawn["inner_degrees"] = min(drawn["inner_degrees"], 0.9 * drawn["outer_degrees"])
+        return kind(**drawn)
 
     def _floor(self, material: Material) -> None:
         y = self.draws.between(-0.1, 0.1)
@@ -177,23 +177,24 @@ class _Stage:
     def _sheet(self, material: Material, name: str, *placed: Any) -> Mesh:
         """Return a square with its front up, two units wide, after these transforms."""
         corners = np.array([(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], np.float32)
-        mesh = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), material, name=name)
-        return _moved(self._coordinates(mesh), *placed)
+        mesh = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), name=name)
+        return _moved(self._finished(mesh, material), *placed)
 
     def _solid(self, material: Material, name: str, subdivisions: int) -> Mesh:
         vertices, faces = icosphere(subdivisions)
         normals = vertices.copy() if self.draws.chance(0.5) else None
-        return self._coordinates(Mesh(vertices, faces, material, normals=normals, name=name))
+        return self._finished(Mesh(vertices, faces, normals=normals, name=name), material)
 
-    def _coordinates(self, mesh: Mesh) -> Mesh:
-        """Add texture coordinates, and sometimes vertex colors, some of them with alpha."""
+    def _finished(self, mesh: Mesh, material: Material) -> Mesh:
+        """Add texture coordinates, sometimes vertex colors, some of them with alpha, and the material."""
         draws, flat = self.draws, mesh.vertices[:, [0, 2]] + mesh.vertices[:, [1, 1]] * np.float32(0.7)
         uv, uv1 = flat * np.float32(draws.between(0.5, 2)), flat[:, ::-1] * np.float32(draws.between(0.5, 2))
         colors: FloatArray | None = None
         if draws.chance(0.2):
             columns = draws.one_of(([0, 2, 0], [0, 2, 0, 2]))
             colors = np.abs(np.sin(draws.between(1, 3) * mesh.vertices[:, columns])).astype(np.float32)
-        return replace(mesh, uv=np.ascontiguousarray(uv), uv1=np.ascontiguousarray(uv1), colors=colors)
+        uv, uv1 = np.ascontiguousarray(uv), np.ascontiguousarray(uv1)
+        return replace(mesh, material=material, uv=uv, uv1=uv1, colors=colors)
 
     def _environment(self, kind: str | None) -> Environment:
         draws = self.draws
