@@ -147,7 +147,8 @@ def queued_pictures(device: Device) -> Iterator[tuple[str, Answers]]:
         "planted": planted(painting),
     }
     for name, subject in subjects.items():
-        yield f"{name} queues", picture(device, subject, paths="queues", direct_light=name == "scene")
+        apart = {"direct_light": name == "scene", "light_groups": name == "ball"}
+        yield f"{name} queues", picture(device, subject, paths="queues", **apart)
 
 
 def work(device: Device) -> Iterator[tuple[str, Answers]]:
@@ -159,6 +160,7 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     for settings, chosen in variants():
         yield chosen["tests"].triangle, picture(device, replace(scene(), render=settings), **chosen)
     yield "ball", picture(device, ball())
+    yield "ball groups", picture(device, ball(), light_groups=True)
     yield "catching", picture(device, replace(catching(scene()), render=replace(SETTINGS, transparent=True)))
     yield from measured(device)
     lit = replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)], render=SETTINGS)

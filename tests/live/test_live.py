@@ -127,7 +127,9 @@ def test_what_is_seen_at_a_place(live: Live) -> None:
     live.edit(replace(live.scene, spheres=live.scene.spheres[1:]))
     whole(live)
     assert live.pick(0.74, 0.5).result(SECONDS) is not ball
-    live.edit(replace(live.scene, camera=replace(live.scene.camera, fov_degrees=200)))
+    broken = replace(live.scene)
+    broken.lights = [3]  # type: ignore[list-item]
+    live.edit(broken)
     assert whole(live).error is not None and live.pick(0.5, 0.5).result(SECONDS) is mesh
 
 

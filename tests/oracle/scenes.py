@@ -151,7 +151,7 @@ class _Stage:
         vertices, faces = icosphere(0)
         # Shading of gloss around bent normals is not standardized: only Lambertian meshes have them.
         normals = vertices.copy() if type(material) is Diffuse and draws.chance(0.5) else None
-        solid = self._with_attributes(Mesh(vertices, faces, material, normals=normals))
+        solid = self._finished(Mesh(vertices, faces, normals=normals), material)
         if shape == "solid":
             self.meshes.append(transform_mesh(solid, _product(*placed)))
             return
@@ -165,18 +165,19 @@ class _Stage:
     def _sheet(self, material: Material, *placed: Doubles) -> None:
         """Add a square that faces up, two units wide."""
         corners = np.array([(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], np.float32)
-        mesh = self._with_attributes(Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), material))
+        mesh = self._finished(Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32)), material)
         self.meshes.append(transform_mesh(mesh, _product(*placed)))
 
-    def _with_attributes(self, mesh: Mesh) -> Mesh:
-        """Return the mesh with texture coordinates, and possibly colors, a third of them with alpha."""
+    def _finished(self, mesh: Mesh, material: Material) -> Mesh:
+        """Return the mesh with texture coordinates, possibly colors, a third of them with alpha, and the material."""
         draws, flat = self.draws, mesh.vertices[:, [0, 2]] + mesh.vertices[:, [1, 1]] * np.float32(0.7)
         uv, uv1 = flat * np.float32(draws.between(0.5, 2)), flat[:, ::-1] * np.float32(draws.between(0.5, 2))
         colors = None
         if draws.chance(0.2):
             channels = draws.one_of(([0, 2, 0], [0, 2, 0], [0, 2, 0, 2]))
             colors = np.abs(np.cos(draws.between(0.2, 1.5) * mesh.vertices[:, channels])).astype(np.float32)
-        return replace(mesh, uv=np.ascontiguousarray(uv), uv1=np.ascontiguousarray(uv1), colors=colors)
+        uv, uv1 = np.ascontiguousarray(uv), np.ascontiguousarray(uv1)
+        return replace(mesh, material=material, uv=uv, uv1=uv1, colors=colors)
 
     def _environment(self, kind: str | None) -> Environment:
         draws = self.draws

@@ -148,11 +148,9 @@ def test_textures_and_normal_maps_are_seen() -> None:
     def plain(*rgb: int) -> Texture:
         return Texture(picture=Picture(np.full((2, 2, 4), (*rgb, 255), np.uint8)))
 
-    wall = quad(
-        [(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)],
-        Diffuse(color=plain(255, 0, 255), normal_map=plain(204, 128, 204)),
-    )
+    wall = quad([(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)], Diffuse())
     wall.uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
+    wall.material = Diffuse(color=plain(255, 0, 255), normal_map=plain(204, 128, 204))
     scene = Scene(
         meshes=[wall],
         environment=Environment(color=(1, 1, 1)),

@@ -229,8 +229,8 @@ def bumps(seed: int) -> Texture:
 def furnace(material: Material, seed: int) -> Scene:
     """Return a sheet with a normal map, or a convex mesh with random normals, in a white furnace."""
     if getattr(material, "normal_map", None) is not None:
-        mesh = quad([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], material)
-        mesh = replace(mesh, uv=np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32))
+        mesh = quad([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], Diffuse())
+        mesh = replace(mesh, uv=np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32), material=material)
     else:
         vertices, faces = icosphere(1)
         normals = unit(vertices + 0.5 * np.random.default_rng(seed).normal(size=vertices.shape))

@@ -86,7 +86,7 @@ LIGHTS = [
     SpotLight(position=(0.0, 3.0, 0.0), direction=DOWN, intensity=WHITE),
 ]
 #: The only ones that users cannot set directly.
-BY_AOVS = {"direct_light", "light_groups"}
+BY_AOVS = {"direct_light": "direct", "light_groups": "light_groups"}
 
 
 def scene(**given: Any) -> Scene:
@@ -239,7 +239,7 @@ STOP = {"error"}
 def test_renderer_farm_and_report_take_every_one(device: Device, name: str) -> None:
     """Renderer options include every one, the farm's orders map it to the same choices, and the report lists it."""
     options: dict[str, Any] = {"size": (8, 8), "device": device.info.index}
-    options |= {"aovs": ("direct",)} if name in BY_AOVS else {name: OTHER[name]}
+    options |= {"aovs": (BY_AOVS[name],)} if name in BY_AOVS else {name: OTHER[name]}
     assert options.keys() <= inspect.signature(clrt.Renderer).parameters.keys()
     content = scene(meshes=[], instances=[], lights=[], environment=clrt.Environment(color=(1.0, 1.0, 1.0)))
     order, wanted = PictureOrder(content, options), changed(content.render, Choices(), name)
