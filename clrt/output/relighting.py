@@ -49,8 +49,11 @@ def _scale(group: str, factor: Factor, groups: Mapping[str, FloatArray]) -> NDAr
     if group not in groups:
         meant = did_you_mean(group, groups)
         raise UsageError(f"light group {group!r} is unknown; choose from {', '.join(groups)}{meant}")
-    scale = np.asarray(factor, np.float64)
+    try:
+        scale = np.asarray(factor, np.float64)
+    except (TypeError, ValueError):
+        scale = np.empty(0)
     if scale.size not in (1, 3) or not (np.isfinite(scale) & (scale >= 0)).all():
-        given = ",".join(map(str, scale.reshape(-1).tolist()))
+        given = ",".join(map(str, scale.reshape(-1).tolist())) or repr(factor)
         raise UsageError(f"light group {group!r}: {given} is not a factor; give a number of at least 0, or three")
     return scale.reshape(-1)

@@ -52,7 +52,8 @@ def test_mistakes(tmp_path: Path) -> None:
         UsageError, match="light group 'kye' is unknown; choose from fill, key, default; did you mean k"
     ):
         clrt.relight(image, {"kye": 1})
-    for factor in (-1, float("nan"), (1, 2), float("inf")):
+    wrong: tuple[Any, ...] = (-1, float("nan"), (1, 2), float("inf"), "half", (1, "x", 2), [[1], []], None, {}, 1j)
+    for factor in wrong:
         with pytest.raises(UsageError, match="light group 'key': .* is not a factor; give a number of at least 0"):
             clrt.relight(image, {"key": factor})
     plain = clrt.Image(image.pixels)

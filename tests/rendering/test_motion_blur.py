@@ -114,7 +114,7 @@ def test_a_moving_ball_has_its_closed_form(device: Device, kind: str) -> None:
 
 
 def test_a_turning_camera_has_its_closed_form(device: Device) -> None:
-    """A panning pinhole camera in front of a sky that is black on one side of an azimuth: a pixel is white for the time
+    """A panning pinhole camera in an environment that is black on one side of an azimuth: a pixel is white for the time
     that its own azimuth is on the other side, as it turns at a constant rate. The edge is a texel wide."""
     texels, angle, size = 4096, 0.5, (24, 16)
     image = np.zeros((8, texels, 3), np.float32)
@@ -166,8 +166,8 @@ def random_scene(rng: np.random.Generator, kind: str) -> tuple[list[Instance], S
     moving = []
     for number in range(3):
         color = tuple(rng.uniform(0.2, 0.9, 3).tolist())
-        glow = tuple(rng.uniform(0.5, 3, 3).tolist()) if kind == "lights" and number else (0.0, 0.0, 0.0)
-        mesh = Mesh(wavy, faces, Diffuse(color=color, emission=glow, double_sided=number == 2), vertices)
+        emission = tuple(rng.uniform(0.5, 3, 3).tolist()) if kind == "lights" and number else (0.0, 0.0, 0.0)
+        mesh = Mesh(wavy, faces, Diffuse(color=color, emission=emission, double_sided=number == 2), vertices)
         ends = []
         for _ in range(2):
             place = translation(tuple(rng.uniform(-1, 1, 3).tolist())) @ rotation(
