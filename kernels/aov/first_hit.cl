@@ -2,9 +2,9 @@
 //
 // One work-item renders LANES pixels. SEEN_MEANS lists the AOVs averaged over `sample_count` camera rays per pixel,
 // as the image is; SEEN_MIDDLE those taken from the single ray through the pixel centre, at the middle of the
-// exposure, with its primitive, because a mean of positions or ids is meaningless. The host writes both lists, according to the AOVs requested. With ONE_SAMPLE
-// that ray is the pixel's sample number first_sample instead. On a miss all values are 0 and the primitive is -1. World
-// frame.
+// exposure, with its primitive, because a mean of positions or ids is meaningless. The host writes both lists,
+// according to the AOVs requested. With ONE_SAMPLE that ray is the pixel's sample number first_sample instead. On a
+// miss all values are 0 and the primitive is -1. World frame.
 //
 // SEEN_FILES are the files of the materials, if a requested AOV depends on them. To add an AOV: add a function
 // seen_NAME here, with the same value in x, y and z if it has one channel, and its entry in clrt/aov_types.py.
