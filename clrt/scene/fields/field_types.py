@@ -22,6 +22,8 @@ INT64_END = 2**63
 FLOAT32_MAX = (2 - 2**-23) * 2.0**127
 #: More problems than this in one object are counted, not listed.
 MOST = 12
+#: The names of the generic types of arrays; from numpy 2.5 on, NDArray[...] is an alias with a name of its own.
+_ARRAYS = frozenset({"ndarray", "NDArray"})
 
 
 def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[str]:
@@ -106,12 +108,12 @@ def _field_types(kind: type) -> dict[str, Any]:
 @lru_cache
 def _array_fields(kind: type) -> frozenset[str]:
     hints = get_type_hints(kind)
-    return frozenset(field.name for field in fields(kind) if "ndarray" in _origins(hints[field.name]))
+    return frozenset(field.name for field in fields(kind) if _ARRAYS & _origins(hints[field.name]))
 
 
 def _is_opaque(hint: Any) -> bool:
     """Return whether values of this type are not plain data."""
-    return not _origins(hint).isdisjoint({"ndarray", "Mapping", "dict"})
+    return not _origins(hint).isdisjoint(_ARRAYS | {"Mapping", "dict"})
 
 
 def _origins(hint: Any) -> set[str]:
