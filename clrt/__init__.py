@@ -43,7 +43,6 @@ if TYPE_CHECKING:
         irradiance as irradiance,
         radiance as radiance,
     )
-    from .rendering.views import each_view as each_view, render_views as render_views
     from .scene.animation import Animation as Animation, Keyframe as Keyframe
     from .scene.camera_path import frames as frames, turntable as turntable
     from .scene.cameras import CameraEnd as CameraEnd
@@ -81,6 +80,7 @@ if TYPE_CHECKING:
     from .scene.sky.sky import Sky as Sky
     from .scene.stereo import stereo_pair as stereo_pair
     from .scene.view import View as View
+    from .views import each_view as each_view, render_views as render_views
 
     __version__: str
 
@@ -110,7 +110,6 @@ _HOME = {
     "queries.mesh": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
     "rendering.sensors": ("ambient_occlusion", "irradiance", "radiance"),
-    "rendering.views": ("each_view", "render_views"),
     "scene.animation": ("Animation", "Keyframe"),
     "scene.camera_path": ("frames", "turntable"),
     "scene.cameras": ("CameraEnd",),
@@ -140,6 +139,7 @@ _HOME = {
     ),
     "scene.stereo": ("stereo_pair",),
     "scene.view": ("View",),
+    "views": ("each_view", "render_views"),
     "scene.materials.textures": ("Picture", "Texture"),
     "scene.sky.sky": ("Sky",),
 }

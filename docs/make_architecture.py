@@ -21,7 +21,7 @@ FILE = ROOT / "docs" / "images" / "architecture.svg"
 #: What packages do, row by row from the top; each row from x to x, its boxes as wide as the weights say.
 ROWS: tuple[tuple[tuple[str, str, int, int], ...], ...] = (
     (("clrt", "public names", 350, 650), ("cli", "the commands", 670, 850), ("__main__", "", 862, 960)),
-    (("window", "clrt view", 350, 650), ("farm", "several machines", 670, 960)),
+    (("window", "clrt view", 350, 540), ("farm", "several machines", 560, 760), ("views", "of many cameras", 780, 960)),
     (
         ("baking", "light maps", 350, 440),
         ("bench", "speed and accuracy", 452, 578),

@@ -38,6 +38,7 @@ ROOMS = [
     "live",
     "window",
     "farm",
+    "views",
     "clrt",
     "cli",
     "__main__",

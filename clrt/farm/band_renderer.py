@@ -51,10 +51,10 @@ def render(key: str, order: PictureOrder) -> dict[str, Any]:
     renderer = _renderer(key, order)
     guides = renderer.session.guides() if denoiser else {}
     state = None
-    for state in renderer.passes(spp=order.spp, time=order.time, error=order.error):
-        pass
-    assert state is not None  # there is at least one pass
-    image = image_of(renderer, state)
+    if order.lit:
+        for state in renderer.passes(spp=order.spp, time=order.time, error=order.error):
+            pass
+    image = image_of(renderer, state or renderer.state())
     if denoiser is not None:
         image = denoised(image, denoiser, guides)
     found = {"pixels": np.ascontiguousarray(image.pixels), "report": image.report, "raw": image.raw, "aovs": image.aovs}

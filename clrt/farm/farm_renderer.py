@@ -9,8 +9,8 @@ from typing import Unpack, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.open import Device, Selectors
-from ..errors import DeviceError, UsageError
+from ..device.open import Selectors
+from ..errors import DeviceError
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
 from ..rendering.compile.film_record import film_pixel
 from ..rendering.render_warnings import PictureWarnings
@@ -20,7 +20,7 @@ from ..scene.model import Camera, Scene
 from ..scene.validation.validate import validate
 from .cluster import Cluster
 from .farm_picture import FarmAccumulation
-from .orders import Order
+from .orders import Order, worker_selectors
 
 #: Device name in a checkpoint before the workers are known.
 FARM = "a farm"
@@ -57,11 +57,7 @@ class FarmRenderer(Renderer):
 
     def _open(self, device: Selectors, on_phase: Callable[[str], None], before: Renderer | None) -> None:
         validate(self.scene)
-        given = [device] if device is None or isinstance(device, str | int | Device) else list(device)
-        selectors = tuple(each for each in given if isinstance(each, str | int))
-        if len(selectors) < len(given) - (given == [None]):
-            raise UsageError("a farm renders on its workers' devices; give their names instead of opened devices")
-        self.devices, self._selectors = [], selectors
+        self.devices, self._selectors = [], worker_selectors(device)
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> FarmAccumulation:
         order = Order(self.scene, self.choices, self._planned_spp, self._selectors, self._simulated)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from ..device.open import Device, Selectors
+from ..errors import UsageError
 from ..rendering.compile.choices import Choices
 from ..rendering.renderer_options import choices_of, settings_of
 from ..scene.model import Camera, Scene
@@ -31,7 +33,7 @@ class PictureOrder:
     """A whole image.
 
     camera: replaces the scene's; options: of `Renderer`; spp, time, error: of its `passes`; denoise: whether to
-    denoise; band: only tile rows first … end − 1.
+    denoise; band: only tile rows first … end − 1; lit: whether to render more than its AOVs of first hits.
     """
 
     scene: Scene
@@ -42,6 +44,7 @@ class PictureOrder:
     denoise: bool = False
     band: tuple[int, int] | None = None
     camera: Camera | None = None
+    lit: bool = True
 
     @property
     def settled(self) -> Scene:
@@ -54,3 +57,12 @@ class PictureOrder:
     def choices(self) -> Choices:
         """Return the program choices among the options."""
         return choices_of(self.options)
+
+
+def worker_selectors(device: Selectors) -> tuple[str | int, ...]:
+    """Return the selectors among each worker's devices; none for its best one. Raises UsageError for opened devices."""
+    given = [] if device is None else [device] if isinstance(device, str | int | Device) else list(device)
+    selectors = tuple(each for each in given if isinstance(each, str | int))
+    if len(selectors) < len(given):
+        raise UsageError("a farm renders on its workers' devices; give their names instead of opened devices")
+    return selectors

@@ -31,9 +31,9 @@ class DeviceArray:
         return self.size
 
     @driver_errors()
-    def read(self, device: Device) -> NDArray[Any]:
-        """Return a copy of the elements, (size,)."""
-        values = np.empty(self.size, self.dtype)
+    def read(self, device: Device, into: NDArray[Any] | None = None) -> NDArray[Any]:
+        """Return a copy of the elements, (size,), in a new array or the contiguous one given."""
+        values = np.empty(self.size, self.dtype) if into is None else into
         if self.size:
             cl.enqueue_copy(device.queue, values, self.buffer)
         return values

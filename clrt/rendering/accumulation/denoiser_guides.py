@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..compile.records import GUIDE
 from .accumulation import Accumulation
-from .per_pixel_kernel import render_pixels
+from .per_pixel_kernel import per_pixel_kernel, render_pixels
 
 #: Camera rays per pixel. More cost more than they improve the denoised image (docs/denoise.md).
 SAMPLES = 8
@@ -22,5 +22,8 @@ def render_guides(session: Accumulation, samples: int = SAMPLES) -> dict[str, ND
     At mirrors and glass they are those of what is seen in them. The sky's albedo is its radiance, up to 1; it has no
     normal. Raises KernelError and DeviceError if the device fails.
     """
-    values = render_pixels(session, session.compiled.source_of("aov/denoiser_guides.cl"), "guides", GUIDE, samples)
+    kernel = per_pixel_kernel(
+        session, "guides", "guides", lambda: (session.compiled.source_of("aov/denoiser_guides.cl"), GUIDE)
+    )
+    values = render_pixels(session, kernel, samples)
     return {name: np.ascontiguousarray(values[name]) for name in GUIDE.names or () if not name.startswith("pad")}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,9 @@ from ...scene.model import Camera, Scene
 from ...scene.numbered_objects import materials_of
 from ..compile.compile_scene import CompiledScene
 from .accumulation import Accumulation
-from .per_pixel_kernel import render_pixels
+from .per_pixel_kernel import PerPixelKernel, per_pixel_kernel, render_pixels
 
-#: Camera rays per pixel.
+#: Maximum number of camera rays per pixel.
 SAMPLES = 16
 
 
@@ -30,15 +31,18 @@ def first_hits(session: Accumulation, scene: Scene, names: Collection[str]) -> d
     Raises KernelError and DeviceError if the device fails.
     """
     means, centers = _seen(names)
-    source, kind = first_hit_program(session.compiled, names)
-    seen = render_pixels(session, source, "first_hit", kind, SAMPLES if means else 0)
+    seen = render_pixels(session, _kernel(session, names), _samples(session) if means else 0)
     pictures: dict[str, NDArray[np.generic]] = {
         name: np.ascontiguousarray(seen[name] if len(AOV_TYPES[name].channels) == 3 else seen[name][..., 0])
         for name in means + centers
     }
     missed = seen["primitive"] < 0
     if "position" in centers:
-        pictures |= _places(session, seen["position"].astype(np.float64), missed)
+        place = seen["position"].astype(np.float64)
+        if "position" in names:
+            pictures["position"] = _positions(session, place, missed)
+        if "depth" in names:
+            pictures["depth"] = _depths(session, place, missed)
     if layers := [name for name in aovs_from("coverage") if name in names]:
         pictures |= coverage(session, scene, layers)
     ids = _ids(session, scene, seen)
@@ -70,29 +74,44 @@ def first_hit_program(compiled: CompiledScene, names: Collection[str], *preamble
     ), kind
 
 
-def _seen(names: Collection[str]) -> tuple[list[str], list[str]]:
+def _kernel(session: Accumulation, names: Collection[str], *preamble: str) -> PerPixelKernel:
+    """Return the kernel of `first_hit_program`."""
+    program = partial(first_hit_program, session.compiled, names, *preamble)
+    return per_pixel_kernel(session, ("first_hit", *_seen(names), *preamble), "first_hit", program)
+
+
+def _samples(session: Accumulation) -> int:
+    """Return the camera rays per pixel of AOVs that are means: those of the image, in whole blocks of its sampler's
+    sequence, or SAMPLES if these are fewer."""
+    return min(SAMPLES, 1 << int(session.launch["block_bits"][0]))
+
+
+def _seen(names: Collection[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the AOVs that the kernel computes for `names`, those averaged over a pixel and those of its center."""
     needed = {*names, "position"} if "depth" in names else set(names)
     return (
-        [name for name in aovs_from("mean") if name in needed],
-        [name for name in aovs_from("center") if name in needed],
+        tuple(name for name in aovs_from("mean") if name in needed),
+        tuple(name for name in aovs_from("center") if name in needed),
     )
 
 
-def _places(
-    session: Accumulation, seen: NDArray[np.float64], missed: NDArray[np.bool_]
-) -> dict[str, NDArray[np.generic]]:
-    """Return position and depth of points (height, width, 3) given in the compiled scene's frame."""
-    frame, depth = session.compiled.frame, np.zeros(missed.shape)
+def _positions(session: Accumulation, seen: NDArray[np.float64], missed: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Return points (height, width, 3), given in the compiled scene's frame, in the world's; 0 where nothing is hit."""
+    frame = session.compiled.frame
+    return np.where(missed[..., None], 0, seen / frame.unit + frame.center).astype(np.float32)
+
+
+def _depths(session: Accumulation, seen: NDArray[np.float64], missed: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Return the depth of points (height, width, 3) given in the compiled scene's frame; infinite where nothing is
+    hit."""
+    depth = np.empty(missed.shape)
     for rows, camera in _cameras(session):
         axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
-        ahead = (seen[rows] - camera.position) / frame.unit
-        along = np.linalg.norm(ahead, axis=-1) if camera.type.all_around else ahead @ (axis / np.linalg.norm(axis))
-        depth[rows] = along
-    return {
-        "position": np.where(missed[..., None], 0, seen / frame.unit + frame.center).astype(np.float32),
-        "depth": np.where(missed, np.inf, depth).astype(np.float32),
-    }
+        ahead = seen[rows] - camera.position
+        depth[rows] = (
+            np.linalg.norm(ahead, axis=-1) if camera.type.all_around else ahead @ (axis / np.linalg.norm(axis))
+        )
+    return np.where(missed, np.inf, depth / session.compiled.frame.unit).astype(np.float32)
 
 
 def _cameras(session: Accumulation) -> Iterator[tuple[slice, Camera]]:
@@ -109,10 +128,10 @@ def _cameras(session: Accumulation) -> Iterator[tuple[slice, Camera]]:
 
 def coverage(session: Accumulation, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
     """Return Cryptomatte layers (height, width, 2 RANKS): what SAMPLES camera rays per pixel hit first, by coverage."""
-    source, kind = first_hit_program(session.compiled, (), "#define ONE_SAMPLE 1")
+    kernel = _kernel(session, (), "#define ONE_SAMPLE 1")
     hits: dict[str, list[NDArray[np.int64]]] = {name: [] for name in names}
     for number in range(SAMPLES):
-        seen = render_pixels(session, source, "first_hit", kind, SAMPLES, number)
+        seen = render_pixels(session, kernel, SAMPLES, number)
         missed, ids = seen["primitive"] < 0, _ids(session, scene, seen)
         for name in names:
             hits[name].append(np.where(missed, -1, ids[name.removeprefix("crypto_")]))

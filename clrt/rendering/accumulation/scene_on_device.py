@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyopencl as cl
@@ -27,6 +27,9 @@ from ..compile.film_record import launch_type
 from .checked_loops import most_samples
 from .path_queues import PathQueues
 from .raster_bins import RasterBins
+
+if TYPE_CHECKING:
+    from .per_pixel_kernel import PerPixelKernel
 
 #: Defined in programs whose film holds only the pixels of a launch.
 WINDOWS = "#define FILM_WINDOWS 1\n"
@@ -62,6 +65,8 @@ class SceneOnDevice:
         before: Sequence[SceneOnDevice] = (),
     ) -> None:
         self.device, self.compiled, self.launch, self.film_bytes = device, compiled, launch, film_bytes
+        #: Other kernels of this scene (`per_pixel_kernel`).
+        self.per_pixel_kernels: dict[Hashable, PerPixelKernel] = {}
         self._bins: RasterBins | None = None
         self._queues: PathQueues | None = None
         self._check_memory()

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from itertools import tee
 from typing import Annotated, Any, Unpack, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..aov_types import LIGHT_GROUPS, OF_GROUP, aovs_from
-from ..device.open import Selectors
-from ..errors import SceneError, UsageError, did_you_mean
-from ..float_errors import with_default_errors
-from ..scene.cameras import CALIBRATED
-from ..scene.exposure import motion_features
-from ..scene.model import Camera, Scene
-from ..scene.view import View
-from .aovs import AOVS
-from .listed_keywords import listed
-from .renderer import Renderer
-from .renderer_options import SETTINGS, PictureOptions, RendererOptions, TracingOptions
+from .aov_types import LIGHT_GROUPS, OF_GROUP, aovs_from
+from .device.open import Selectors
+from .errors import SceneError, UsageError, did_you_mean
+from .float_errors import with_default_errors
+from .rendering.aovs import AOVS
+from .rendering.listed_keywords import listed
+from .rendering.renderer import Renderer
+from .rendering.renderer_options import SETTINGS, PictureOptions, RendererOptions, TracingOptions
+from .scene.cameras import CALIBRATED
+from .scene.exposure import motion_features
+from .scene.model import Camera, Scene
+from .scene.validation.validate import validate
+from .scene.view import View
 
 #: AOVs under the names that datasets have for them.
 IDS = {"instance_id": "object", "material_id": "material"}
@@ -30,9 +33,10 @@ FLOW_FROM = ("position", "object")
 
 
 class ViewOptions(PictureOptions, TracingOptions, total=False):
-    """Keywords of views: those of a render but for its checkpoints."""
+    """Keywords of views: those of a render but for its checkpoints, and a farm's."""
 
     device: Annotated[Selectors, "See `clrt devices`, or an open device; several render one image together."]
+    scheduler: Annotated[str | None, "A Dask scheduler, tcp://… or tls://…, each of whose workers renders whole views."]
 
 
 @listed(ViewOptions, SETTINGS)
@@ -56,35 +60,72 @@ def each_view(
     names = _chosen(layers)
     aovs = {IDS.get(name, name): None for name in names if name not in ("rgb", "alpha", "flow")}
     aovs |= dict.fromkeys(FLOW_FROM) if "flow" in names else {}
+    scheduler = options.pop("scheduler", None)
     given = cast(RendererOptions, {**options, "aovs": list(aovs)})
     lit = not {"rgb", "alpha"}.isdisjoint(names) or not set(aovs).isdisjoint(aovs_from("film"))
     if not lit:
         given["integrator"] = "normals"  # its program is that of first hits alone
     if "alpha" in names:
         given["transparent"] = True
+    poses, ahead = tee(cameras)
+    rendered = (
+        _rendered(scene, poses, given, lit) if scheduler is None else _farmed(scheduler, scene, poses, given, lit)
+    )
+    for number, ((camera, following), made) in enumerate(zip(_with_next(ahead), rendered)):
+        if "flow" in names:
+            if motion_features(replace(scene, camera=camera)):
+                raise UsageError(
+                    f"view {number} has motion blur, which flow is not defined for; leave flow or shutter out"
+                )
+            made["flow"] = _flow(made["position"], np.greater_equal(made["object"], 0), following)
+        groups = [name for name in made if name.startswith(OF_GROUP)]
+        layers = [layer for name in names for layer in (groups if name == LIGHT_GROUPS else [name])]
+        shown = {name: made[IDS.get(name, name)] for name in layers}
+        yield View(camera, {name: layer.reshape(*layer.shape[:2], -1) for name, layer in shown.items()})
+
+
+def _rendered(
+    scene: Scene, cameras: Iterable[Camera], options: RendererOptions, lit: bool
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """Yield the AOVs of the scene from each camera, and "rgb" and "alpha" if `lit`, rendered on this machine."""
     renderer = None
-    for number, (camera, following) in enumerate(_with_next(cameras)):
-        if "flow" in names and motion_features(replace(scene, camera=camera)):
-            raise UsageError(f"view {number} has motion blur, which flow is not defined for; leave flow or shutter out")
-        try:
+    for number, camera in enumerate(cameras):
+        with _of_view(number):
             if renderer is None:
-                renderer = Renderer(replace(scene, camera=camera), **given)
+                renderer = Renderer(replace(scene, camera=camera), **options)
             else:
                 renderer.look(camera)
-        except SceneError as error:
-            raise SceneError([f"view {number}: {problem}" for problem in error.problems]) from None
         made: dict[str, NDArray[Any]] = dict(renderer.first_hits)
         if lit:
             for state in renderer.passes():
                 pass
             made |= renderer.aovs(state) | {"rgb": state.pixels}
             made |= {} if state.alpha is None else {"alpha": state.alpha}
-        if "flow" in names:
-            made["flow"] = _flow(made["position"], np.greater_equal(made["object"], 0), following)
-        groups = [name for name in made if name.startswith(OF_GROUP)]
-        layers = [layer for name in names for layer in (groups if name == LIGHT_GROUPS else [name])]
-        shown = {name: made[IDS.get(name, name)] for name in layers}
-        yield View(camera, {name: layer.reshape(*layer.shape[:2], -1) for name, layer in shown.items()})
+        yield made
+
+
+def _farmed(
+    scheduler: str, scene: Scene, cameras: Iterable[Camera], options: RendererOptions, lit: bool
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """Yield what `_rendered` does, from the workers of a scheduler."""
+    from .farm.each_view import each_view as each_of_farm
+
+    poses = list(cameras)
+    for number, camera in enumerate(poses):
+        with _of_view(number):
+            validate(Scene(camera=camera, render=scene.render))
+    for picture in each_of_farm(scheduler, scene, poses, options, lit):
+        alpha = picture.get("alpha")
+        yield {**picture["aovs"], "rgb": picture["pixels"], **({} if alpha is None else {"alpha": alpha})}
+
+
+@contextmanager
+def _of_view(number: int) -> Iterator[None]:
+    """Name the view in errors of its camera."""
+    try:
+        yield
+    except SceneError as error:
+        raise SceneError([f"view {number}: {problem}" for problem in error.problems]) from None
 
 
 @listed(ViewOptions, SETTINGS)
