@@ -52,7 +52,9 @@ INTEGRATORS = ["path", "direct", "local", "raster"]
     type=OneOf(INTEGRATORS),
     help="Integrator instead of the scene's; may be repeated. Each has its own reference.",
 )
-@click.option("--peers", is_flag=True, help="Also compare Mitsuba and Cycles, if installed.")
+@click.option(
+    "--peers", is_flag=True, help="Also compare Mitsuba, which reads its own .xml files, and Cycles, if installed."
+)
 @click.option(
     "--device", "selectors", multiple=True, metavar="SEL", help="Device to use; see `clrt devices`. May be repeated."
 )
@@ -122,6 +124,7 @@ def converge_command(
         _effort(**asked),
         peers=peers,
         given=given,
+        files=[file for file in scenes for _ in integrators or [None]],
         choices=_choices(names),
         say=partial(click.echo, err=True),
     ):

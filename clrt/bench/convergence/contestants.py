@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ MORE_CHOICES: dict[str, dict[str, Any]] = {
     "clrt, paths in lanes": {"paths": "lanes"},
     "clrt, unplanned": {"spp": None},
 }
-#: Other renderers: pip package, and the module of this package with their `contestants(scene)`.
+#: Other renderers: pip package, and the module of this package with their `contestants(scene, file)`.
 PEERS = {"mitsuba": "mitsuba_renderer", "bpy": "cycles_renderer"}
 
 
@@ -61,13 +62,16 @@ def choices_on(
     }
 
 
-def peers_of(scene: Scene) -> tuple[dict[str, Contestant], dict[str, str]]:
-    """Return the contestants of all PEERS, and why a peer has none: not installed, or an unsupported scene."""
+def peers_of(scene: Scene, file: Path | None = None) -> tuple[dict[str, Contestant], dict[str, str]]:
+    """Return the contestants of all PEERS, and why a peer has none: not installed, or an unsupported scene.
+
+    file: the scene's, which a peer reads itself if it is in its own format.
+    """
     found: dict[str, Contestant] = {}
     missing = {}
     for package, module in PEERS.items():
         try:
-            found |= import_module(f"..renderers.{module}", __package__).contestants(scene)
+            found |= import_module(f"..renderers.{module}", __package__).contestants(scene, file)
         except ImportError:
             missing[package] = f"not installed (pip install {package})"
         except UsageError as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import inf, log, nan
+from pathlib import Path
 from statistics import fmean, linear_regression, median
 from typing import Any, NamedTuple
 
@@ -63,16 +64,19 @@ def measure_convergence(
     peers: bool = False,
     choices: Mapping[str, Mapping[str, Any]] = CHOICES,
     given: Reference | None = None,
+    files: Sequence[Path | None] = (),
     say: Callable[[str], None] = lambda message: None,
 ) -> Iterator[dict[str, Any]]:
     """Yield the results of `clrt bench converge`, scene by scene.
 
     scene, size, max_depth; reference: `spp` (0: given) and its own `relmse`; missing: why a peer is not among the
     contestants; and contestants: the result of `figures`. given: the reference; by default one is rendered per scene.
-    say: called first with the reasons for missing peers, then for each step of a reference that is not cached. Raises
-    what `Renderer` raises.
+    files: of the scenes, for peers. say: called first with the reasons for missing peers, then for each step of a
+    reference that is not cached. Raises what `Renderer` raises.
     """
-    others = [peers_of(scene) if peers else ({}, {}) for scene in scenes]
+    others = [
+        peers_of(scene, file) if peers else ({}, {}) for scene, file in zip(scenes, files or [None] * len(scenes))
+    ]
     for scene, (_, missing) in zip(scenes, others):
         for package, why in missing.items():
             say(f"{scene.name}: without {package}: {why}")

@@ -19,8 +19,11 @@ from ..convergence.contestants import Contestant, Picture
 from .cycles_scene import blender_scene, check_scene
 
 
-def contestants(scene: Scene) -> dict[str, Contestant]:
-    """Return Cycles. Raises ImportError if it is not installed, UsageError if it does not support the scene."""
+def contestants(scene: Scene, file: Path | None = None) -> dict[str, Contestant]:
+    """Return Cycles, whose scene is converted whatever the file.
+
+    Raises ImportError if it is not installed, UsageError if it does not support the scene.
+    """
     library = import_module("bpy")
     check_scene(scene)
     return {"cycles": Cycles(library, partial(blender_scene, library.data, scene))}

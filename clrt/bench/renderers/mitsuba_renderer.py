@@ -14,8 +14,8 @@ import numpy as np
 
 from ...scene.model import Scene
 from ..convergence.contestants import Contestant, Picture
-from .mitsuba_bsdfs import Plugin
-from .mitsuba_scene import mitsuba_scene
+from .mitsuba_file import from_file
+from .mitsuba_scene import mitsuba_scene, path_depth
 
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 #: Samplers by suffix of the contestant's name.
@@ -27,17 +27,27 @@ OLDEST_LLVM = 17
 LLVM_FOLDERS = ("usr/lib", "usr/lib64", "usr/lib/*-linux-gnu", "usr/lib/llvm*/lib", "usr/local/lib")
 
 
-def contestants(scene: Scene) -> dict[str, Contestant]:
-    """Return Mitsuba with each of SAMPLERS. Raises ImportError if not installed, UsageError for unsupported scenes."""
+def contestants(scene: Scene, file: Path | None = None) -> dict[str, Contestant]:
+    """Return Mitsuba with each of SAMPLERS, which reads the scene's file itself if that is one of its own.
+
+    Raises ImportError if it is not installed, and UsageError for unsupported scenes and files that Mitsuba refuses.
+    """
     library, name = load()
-    return {name + suffix: Mitsuba(library, mitsuba_scene(scene, sampler)) for suffix, sampler in SAMPLERS.items()}
+    own = file if file and file.suffix.lower() == ".xml" else None
+    return {
+        name + suffix: Mitsuba(
+            library,
+            from_file(library, own, scene.render, path_depth(scene), sampler) if own else mitsuba_scene(scene, sampler),
+        )
+        for suffix, sampler in SAMPLERS.items()
+    }
 
 
 class Mitsuba:
-    """Contestant that renders the result of `mitsuba_scene`."""
+    """Contestant that renders a scene of Mitsuba's, or the result of `mitsuba_scene`."""
 
-    def __init__(self, library: Any, plugins: Plugin) -> None:
-        self._library, self._plugins = library, plugins
+    def __init__(self, library: Any, scene: Any) -> None:
+        self._library, self._given = library, scene
         self._compiled: set[int] = set()
 
     def __call__(self, spp: int, seed: int) -> Picture:
@@ -53,7 +63,8 @@ class Mitsuba:
 
     @cached_property
     def _scene(self) -> Any:
-        return self._library.load_dict(native(self._library, self._plugins))
+        given = self._given
+        return self._library.load_dict(native(self._library, given)) if isinstance(given, dict) else given
 
 
 def newest_llvm(root: Path = Path("/")) -> tuple[int, Path | None]:

@@ -47,13 +47,12 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
     check_seen_as_lit(scene, "Mitsuba")
     if biases := biased_by(scene.render):
         raise UsageError(f"{scene.name}: Mitsuba clamps nothing; leave out {' and '.join(biases)}")
-    depth = scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
     owners: list[Mesh | Sphere] = [*unfolded(scene).meshes, *scene.spheres]
     absorbs = any(isinstance(owner.material, Dielectric) and medium(owner.material) for owner in owners)
     plugins: Plugin = {
         "type": "scene",
         "sensor": _sensor(scene, sampler),
-        "integrator": {"type": "volpath" if absorbs else "path", "max_depth": depth},
+        "integrator": {"type": "volpath" if absorbs else "path", "max_depth": path_depth(scene)},
     }
     plugins |= {
         f"{'mesh' if isinstance(owner, Mesh) else 'sphere'}{i}": _surface(owner)
@@ -62,6 +61,11 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
     }
     plugins |= {f"light{i}": _light(light, scene.camera) for i, light in enumerate(scene.lights)}
     return plugins | _environment(scene.environment)
+
+
+def path_depth(scene: Scene) -> int:
+    """Return Mitsuba's maximum path depth for the scene's integrator, "path" or "direct"."""
+    return scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
 
 
 def _sensor(scene: Scene, sampler: str) -> Plugin:
