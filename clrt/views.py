@@ -22,6 +22,7 @@ from .rendering.renderer_options import SETTINGS, PictureOptions, RendererOption
 from .scene.cameras import CALIBRATED
 from .scene.exposure import motion_features
 from .scene.model import Camera, Scene
+from .scene.on_ground import is_below, on_plain_ground
 from .scene.validation.validate import validate
 from .scene.view import View
 
@@ -68,9 +69,13 @@ def each_view(
     if "alpha" in names:
         given["transparent"] = True
     poses, ahead = tee(cameras)
-    rendered = (
-        _rendered(scene, poses, given, lit) if scheduler is None else _farmed(scheduler, scene, poses, given, lit)
-    )
+    seen = _scenes(scene, poses, lit)
+    if scheduler is None:
+        rendered = _rendered(seen, given, lit)
+    else:
+        from .farm.each_view import each_view as each_of_farm
+
+        rendered = each_of_farm(scheduler, seen, given, lit)
     for number, ((camera, following), made) in enumerate(zip(_with_next(ahead), rendered)):
         if "flow" in names:
             if motion_features(replace(scene, camera=camera)):
@@ -84,17 +89,26 @@ def each_view(
         yield View(camera, {name: layer.reshape(*layer.shape[:2], -1) for name, layer in shown.items()})
 
 
-def _rendered(
-    scene: Scene, cameras: Iterable[Camera], options: RendererOptions, lit: bool
-) -> Iterator[dict[str, NDArray[Any]]]:
-    """Yield the AOVs of the scene from each camera, and "rgb" and "alpha" if `lit`, rendered on this machine."""
-    renderer = None
+def _scenes(scene: Scene, cameras: Iterable[Camera], lit: bool) -> Iterator[Scene]:
+    """Yield the scene from each camera; if not `lit`, with the ground that its images of light have."""
+    worlds: dict[bool, Scene] = {}
     for number, camera in enumerate(cameras):
         with _of_view(number):
+            seen = replace(scene, camera=camera)
+            validate(Scene(camera=camera, render=scene.render))
+        world = scene if lit else worlds.setdefault(is_below(seen), on_plain_ground(seen))
+        yield replace(world, camera=camera)
+
+
+def _rendered(scenes: Iterable[Scene], options: RendererOptions, lit: bool) -> Iterator[dict[str, NDArray[Any]]]:
+    """Yield the AOVs of each scene, and "rgb" and "alpha" if `lit`, rendered on this machine."""
+    renderer = None
+    for number, scene in enumerate(scenes):
+        with _of_view(number):
             if renderer is None:
-                renderer = Renderer(replace(scene, camera=camera), **options)
+                renderer = Renderer(scene, **options)
             else:
-                renderer.look(camera)
+                renderer.show(scene)
         made: dict[str, NDArray[Any]] = dict(renderer.first_hits)
         if lit:
             for state in renderer.passes():
@@ -102,21 +116,6 @@ def _rendered(
             made |= renderer.aovs(state) | {"rgb": state.pixels}
             made |= {} if state.alpha is None else {"alpha": state.alpha}
         yield made
-
-
-def _farmed(
-    scheduler: str, scene: Scene, cameras: Iterable[Camera], options: RendererOptions, lit: bool
-) -> Iterator[dict[str, NDArray[Any]]]:
-    """Yield what `_rendered` does, from the workers of a scheduler."""
-    from .farm.each_view import each_view as each_of_farm
-
-    poses = list(cameras)
-    for number, camera in enumerate(poses):
-        with _of_view(number):
-            validate(Scene(camera=camera, render=scene.render))
-    for picture in each_of_farm(scheduler, scene, poses, options, lit):
-        alpha = picture.get("alpha")
-        yield {**picture["aovs"], "rgb": picture["pixels"], **({} if alpha is None else {"alpha": alpha})}
 
 
 @contextmanager

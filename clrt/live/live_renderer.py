@@ -15,6 +15,7 @@ from ..output.denoise import Denoiser, denoised_layers
 from ..rendering.accumulation.denoiser_guides import render_guides
 from ..rendering.renderer import Renderer, State
 from ..scene.model import Scene
+from ..scene.numbered_objects import objects_of
 from .image_sizing import ImageSizing
 from .picks import Thing
 from .settings import Selector, Settings
@@ -123,10 +124,8 @@ class LiveRenderer:
             self._met = renderer.session.first_hits(renderer.scene, ["object"])["object"]
             self._met_by = renderer
         row, column = (min(max(int(at * size), 0), size - 1) for at, size in zip((y, x), self._met.shape))
-        number, scene = int(self._met[row, column]), renderer.scene
-        things: list[Thing] = [*scene.meshes, *scene.instances, *scene.spheres]
-        is_ground = number == len(renderer.given.meshes) < len(scene.meshes)
-        return None if number < 0 or is_ground else things[number]
+        number, things = int(self._met[row, column]), objects_of(renderer.given)
+        return things[number] if 0 <= number < len(things) else None  # the ground is no object of the scene
 
     def abandon(self) -> None:
         """Make `states` end soon; thread-safe."""

@@ -4,11 +4,27 @@ from __future__ import annotations
 
 from .materials.material_types import Material
 from .model import Instance, Mesh, Scene, Sphere
+from .on_ground import GroundMesh
 
 
 def objects_of(scene: Scene) -> list[Mesh | Instance | Sphere]:
-    """Return the objects by number: meshes, then instances, then spheres."""
+    """Return the objects by number: meshes, then instances, then spheres, and last the ground's mesh."""
+    return sorted(_every(scene), key=_is_ground)
+
+
+def numbers_of(scene: Scene) -> list[int]:
+    """Return the numbers of the scene's meshes, its instances and its spheres."""
+    every = _every(scene)
+    order = sorted(range(len(every)), key=lambda i: _is_ground(every[i]))
+    return sorted(order, key=order.__getitem__)
+
+
+def _every(scene: Scene) -> list[Mesh | Instance | Sphere]:
     return [*scene.meshes, *scene.instances, *scene.spheres]
+
+
+def _is_ground(thing: Mesh | Instance | Sphere) -> bool:
+    return isinstance(thing, GroundMesh)
 
 
 def materials_of(scene: Scene) -> tuple[list[Material], list[int]]:

@@ -15,6 +15,10 @@ LIGHT = ("path", "direct", "local", "raster")
 CATCHING = ("path", "direct")
 
 
+class GroundMesh(Mesh):
+    """The mesh of a ground, whose number follows those of all objects."""
+
+
 def on_ground(scene: Scene) -> Scene:
     """Return the scene with its ground as its last mesh, or without.
 
@@ -29,6 +33,14 @@ def on_ground(scene: Scene) -> Scene:
     return replace(scene, meshes=[*scene.meshes, _floor(ground, hidden)] if shown else scene.meshes, ground=None)
 
 
+def on_plain_ground(scene: Scene) -> Scene:
+    """Return the scene with the ground that its images of light have, for images of data: never as a catcher."""
+    ground = scene.ground
+    if ground is None:
+        return scene
+    return replace(scene, meshes=[*scene.meshes, *[_floor(ground, False)] * (not is_below(scene))], ground=None)
+
+
 def is_below(scene: Scene) -> bool:
     """Return whether the camera is below the ground, which would hide the scene."""
     position = getattr(scene.camera, "position", None)
@@ -36,12 +48,12 @@ def is_below(scene: Scene) -> bool:
 
 
 @lru_cache(maxsize=8)
-def _floor(ground: Ground, catcher: bool) -> Mesh:
+def _floor(ground: Ground, catcher: bool) -> GroundMesh:
     """Return the mesh; the same object for an equal ground, so that what is made of it can be reused."""
     x, z = ground.center
     corners = [(-1, -1), (-1, 1), (1, 1), (1, -1)]
     vertices = [(x + ground.radius * right, ground.height, z + ground.radius * front) for right, front in corners]
-    return Mesh(
+    return GroundMesh(
         vertices=np.array(vertices, np.float32),
         faces=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
         material=Diffuse(color=ground.color, catcher=catcher),

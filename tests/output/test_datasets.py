@@ -128,6 +128,29 @@ def test_masks_are_the_instances(folder: Path) -> None:
             assert coco.cats[each["category_id"]]["name"] == SCENE.spheres[each["object"]].name
 
 
+@pytest.mark.needs("pycocotools")
+def test_the_instances_themselves_are_perfect_detections(folder: Path) -> None:
+    """COCO's evaluation leaves out annotations that are marked as crowds."""
+    from pycocotools.coco import COCO
+    from pycocotools.cocoeval import COCOeval
+
+    coco = COCO(str(folder / "annotations.json"))
+    found = [
+        {
+            "image_id": each["image_id"],
+            "category_id": each["category_id"],
+            "segmentation": coco.annToRLE(each),
+            "score": 1,
+        }
+        for each in coco.anns.values()
+    ]
+    judged = COCOeval(coco, coco.loadRes(found), "segm")
+    judged.evaluate()
+    judged.accumulate()
+    judged.summarize()
+    assert judged.stats[0] == 1
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_run_lengths_are_of_the_mask(seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,34 @@ def test_without_light_the_layers_are_the_same(device: Device) -> None:
     unlit = clrt.render_views(scene, [scene.camera], names, **options)
     for name in names:
         np.testing.assert_array_equal(unlit[name], lit[name])
+
+
+def test_a_ground_is_the_last_object_with_light_and_without(device: Device, tmp_path: Path) -> None:
+    """The numbers of instances and spheres are theirs, whatever the ground; annotations leave it out."""
+    cube = clrt.load(SCENES / "models" / "spot.obj").meshes[0]
+    scene = clrt.Scene(
+        meshes=[cube],
+        instances=[clrt.Instance(cube, np.eye(3, 4) + [[0, 0, 0, 1.5], [0] * 4, [0] * 4], name="other")],
+        spheres=[clrt.Sphere(center=(-1.5, 0, 0), radius=0.5, material=clrt.Diffuse(), name="ball")],
+        ground=clrt.Ground(height=-1, radius=5),
+        environment=clrt.Environment(color=(1, 1, 1)),
+        camera=clrt.Camera(position=(0, 1, 6), look_at=(0, 0, 0)),
+    )
+    below = replace(scene.camera, position=(0.0, -2.0, 6.0))
+    cameras = [scene.camera, below, scene.camera]
+    names = ["depth", "instance_id", "material_id"]
+    options: dict[str, Any] = {"size": SIZE, "spp": 1, "device": device.info.index}
+    lit = clrt.render_views(scene, cameras, ["rgb", *names], **options)
+    unlit = clrt.render_views(scene, cameras, names, **options)
+    for name in names:
+        np.testing.assert_array_equal(unlit[name], lit[name])
+    objects = len(scene.meshes) + len(scene.instances) + len(scene.spheres)
+    assert {*np.unique(lit["instance_id"][0]).tolist()} == {-1, *range(objects + 1)}
+    assert lit["instance_id"][0, -1, SIZE[0] // 2, 0] == objects
+    assert lit["instance_id"][1].max() == objects - 1
+    folder = clrt.save_views(tmp_path, scene, clrt.each_view(scene, cameras, names, **options), "coco")
+    annotations = json.loads((folder / "annotations.json").read_text())["annotations"]
+    assert {each["object"] for each in annotations} == {*range(objects)}
 
 
 def test_flow_leads_to_the_same_point(device: Device) -> None:

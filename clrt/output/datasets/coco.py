@@ -18,7 +18,10 @@ OBJECTS = ("instance_id", "object")
 
 
 class CocoWriter:
-    """Collects the annotations, and writes them to annotations.json at the end. names: of the objects, by number."""
+    """Collects the annotations, and writes them to annotations.json at the end.
+
+    names: of the objects to annotate, by number; the ground of a bare model is none of them.
+    """
 
     def __init__(self, folder: Path, names: Sequence[str]) -> None:
         self._path, self._names = folder / "annotations.json", names
@@ -35,7 +38,7 @@ class CocoWriter:
         width, height = view.size
         self._images.append({"id": image, "file_name": view.file, "width": width, "height": height})
         numbers = layer[..., 0].astype(np.int64)
-        for number in np.unique(numbers[numbers >= 0]).tolist():
+        for number in np.unique(numbers[(numbers >= 0) & (numbers < len(self._names))]).tolist():
             mask = numbers == number
             self._annotations.append(
                 {
@@ -46,7 +49,7 @@ class CocoWriter:
                     "bbox": box(mask),
                     "area": int(mask.sum()),
                     "segmentation": {"size": list(mask.shape), "counts": run_lengths(mask)},
-                    "iscrowd": 1,  # marks masks that are given as run lengths
+                    "iscrowd": 0,
                 }
             )
 

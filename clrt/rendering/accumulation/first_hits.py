@@ -15,7 +15,7 @@ from ...device.programs.struct_types import record
 from ...scene.cryptomatte import NAMES, RANKS, ids_of
 from ...scene.exposure import camera_at, middle_of_rows
 from ...scene.model import Camera, Scene
-from ...scene.numbered_objects import materials_of
+from ...scene.numbered_objects import materials_of, numbers_of
 from ..compile.compile_scene import CompiledScene
 from .accumulation import Accumulation
 from .per_pixel_kernel import PerPixelKernel, per_pixel_kernel, render_pixels
@@ -154,6 +154,6 @@ def ranked(hits: NDArray[np.int64], ids: NDArray[np.float32]) -> NDArray[np.floa
 
 def _ids(session: Accumulation, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:
     """Return the ids at first hits: the scene's object, its primitive, and its material."""
-    which, primitive = session.compiled.objects.met(seen["primitive"], seen["instance"])
-    materials = np.array([*materials_of(scene)[1], -1])
+    place, primitive = session.compiled.objects.met(seen["primitive"], seen["instance"])
+    which, materials = np.array([*numbers_of(scene), -1])[place], np.array([*materials_of(scene)[1], -1])
     return {"primitive": primitive, "object": which, "material": materials[which]}
