@@ -105,6 +105,11 @@ def test_saved_scenes_move_alike(tmp_path: Path) -> None:
         ),
         ("pivot = [1, 0, 0]", "pivots = [1, 0, 0]", 'mesh[0].motion: key "pivots" is unknown; did you mean "pivot"?'),
         ("rotate_degrees = [0, 0, 90]", "scale = 0", "mesh[0].motion: its transform flattens the mesh"),
+        (
+            "[0, 0, 90]",
+            "[0, 0, 181]",
+            "mesh[0].motion.rotate_degrees: [0, 0, 181] is more than 180 degrees from [0.0, 0.0",
+        ),
         ("matrix = [[2, 0, 0, 1]", "matrix = [[0, 0, 0, 1]", "instance[1].motion: its transform"),
         ("rotate_degrees = [0, 0, 90]", "scale = [-1, 1, 1]", "one of to_world and to_world_end mirrors"),
         ("fov_degrees = 30", "fov_degrees = 0", "camera.end.fov_degrees: 0 is not above 0"),

@@ -14,10 +14,11 @@ from hypothesis import given, settings, strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
 import clrt
-from clrt.errors import ClrtError, SceneError
+from clrt.errors import ClrtError, ObjectError, SceneError
 from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.fields.field_types import field_problems
+from clrt.scene.fields.validated import Editable
 from clrt.scene.lights import LIGHTS
 from clrt.scene.materials.material_types import MATERIALS
 from clrt.scene.model import Scene
@@ -212,6 +213,15 @@ def test_unknown_fields_are_named_with_the_closest_one() -> None:
         known = fields(kind)[-1].name
         with pytest.raises(SceneError, match=f'^{kind.__name__}: the field "{known}x" is unknown; did you mean "'):
             kind(**{f"{known}x": 1})
+
+
+@pytest.mark.parametrize("kind", [Scene, *[kind for kind in MADE if issubclass(kind, Editable)]])
+def test_fields_that_do_not_exist_cannot_be_assigned(kind: type) -> None:
+    made = Scene() if kind is Scene else MADE[kind][0]()
+    for name in (field.name for field in fields(kind)):
+        setattr(made, name, getattr(made, name))
+        with pytest.raises(ObjectError, match=f'the field "{name}_" is unknown; did you mean "{name}"'):
+            setattr(made, f"{name}_", 3)
 
 
 def test_errors_are_pickled() -> None:

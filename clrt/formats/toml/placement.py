@@ -36,6 +36,17 @@ class Transform:
             raise SceneError(f"{where}.matrix[3]: {show(self.matrix[3])} is not affine; write [0, 0, 0, 1]")
         return np.array(self.matrix, np.float64)
 
+    def turn_fault(self, motion: Mapping[str, Any]) -> str | None:
+        """Return what is wrong with the rotation from this table's to that of its `motion`, which is less than a half
+        turn; None if nothing is."""
+        start, end = self.rotate_degrees, tuple(motion.get("rotate_degrees", self.rotate_degrees))
+        if all(abs(after - before) <= 180 for before, after in zip(start, end)):
+            return None
+        return (
+            f"rotate_degrees: {show(end)} is more than 180 degrees from {show(start)}, and the shorter way is taken; "
+            "write at most a half turn"
+        )
+
     def moved(self, motion: Mapping[str, Any]) -> Self:
         """Return the table with the transform keys of its `motion`, which replace its own; a matrix replaces all."""
         keys = {key.name: key.default for key in fields(Transform)} if "matrix" in motion else {}

@@ -371,6 +371,8 @@ class SceneReader:
             return None, ORIGIN
         keys = _one_scale(motion)
         built = self._build(MotionTable, keys, f"{where}.motion")
+        if built and (fault := table.turn_fault(keys)):
+            self.problems.append(f"{where}.motion.{fault}")
         return (table.moved(usable(MotionTable, keys)), built.pivot) if built else (None, ORIGIN)
 
     def _located(self, values: Table) -> Table:

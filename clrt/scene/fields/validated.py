@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any, Self
 
@@ -11,13 +12,15 @@ from .tuples import tuples_for_lists
 
 
 class KnownFields:
-    """Base class of dataclasses that raise ObjectError for unknown keywords, with the closest one."""
+    """Base class of dataclasses that raise ObjectError for unknown keywords and attributes, with the closest one."""
 
     def __new__(cls, *values: object, **named: object) -> Self:
-        known = field_types(cls)
-        if wrong := [name for name in named if name not in known]:
-            raise ObjectError(cls.__name__, [f': the field "{name}" {unknown(name, known)}' for name in wrong])
+        _check_known(cls, named)
         return super().__new__(cls)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        _check_known(type(self), (name,))
+        super().__setattr__(name, value)
 
 
 class Validated(KnownFields):
@@ -78,7 +81,7 @@ class Editable(Validated):
 
     def __setattr__(self, name: str, value: object) -> None:
         arrays = array_fields(type(self))
-        object.__setattr__(self, name, read_only(value) if name in arrays else value)
+        super().__setattr__(name, read_only(value) if name in arrays else value)
         vars(self).pop("_valid", None)
 
     def check(self) -> None:
@@ -86,6 +89,12 @@ class Editable(Validated):
             if faults := self.faults():
                 raise ObjectError(self.title, faults)
             vars(self)["_valid"] = True
+
+
+def _check_known(kind: type, names: Iterable[str]) -> None:
+    known = field_types(kind)
+    if wrong := [name for name in names if name not in known]:
+        raise ObjectError(kind.__name__, [f': the field "{name}" {unknown(name, known)}' for name in wrong])
 
 
 def read_only(value: Any) -> Any:
