@@ -51,7 +51,7 @@ def command(
     from ..rendering.compile.compile_scene import compile_scene
     from ..rendering.renderer_options import choices_of
     from ..scene.on_ground import on_ground
-    from .scene_lists import lights_in, materials_in
+    from .scene_lists import lights_in, materials_in, meshes_in
     from .scene_report import report_lines, scene_report
 
     names = chosen_aovs(",".join(aovs)) if aovs else ()
@@ -60,6 +60,7 @@ def command(
     compiled = compile_scene(on_ground(content), choices, device=_device(selector))
     report = {
         **scene_report(content, compiled, names),
+        "mesh_list": meshes_in(content),
         "material_list": materials_in(content),
         "light_list": lights_in(content),
     }

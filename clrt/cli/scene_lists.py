@@ -1,4 +1,4 @@
-"""Materials and lights of a scene by name, for `clrt info`."""
+"""Meshes, materials and lights of a scene by name, for `clrt info`."""
 
 from __future__ import annotations
 
@@ -20,6 +20,19 @@ from ..scene.sky.sky import SkyEnvironment
 MOST = 40
 #: The field with the light group of an emitter.
 GROUP = "light_group"
+
+
+def meshes_in(scene: Scene) -> list[dict[str, Any]]:
+    """Return the name of each mesh, also of those that instances show, its triangles and sets of texture coordinates."""
+    distinct = {id(mesh): mesh for mesh in (*scene.meshes, *(each.mesh for each in scene.instances))}
+    return [
+        {
+            "name": mesh.name,
+            "triangles": len(mesh.faces),
+            "uv_sets": sum(coordinates is not None for coordinates in (mesh.uv, mesh.uv1)),
+        }
+        for mesh in distinct.values()
+    ]
 
 
 def materials_in(scene: Scene) -> list[dict[str, Any]]:
@@ -92,6 +105,12 @@ def _environment(sky: Environment) -> Iterator[dict[str, Any]]:
         yield {"type": "environment map", "size": f"{width}x{height}", "strength": sky.strength, **_group(sky)}
     elif sky.image is None and any(sky.color) and sky.strength:
         yield {"type": "environment", "color": sky.color, "strength": sky.strength, **_group(sky)}
+
+
+def mesh_texts(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the lines for `meshes_in`."""
+    coordinates = ("no texture coordinates", "texture coordinates", "two sets of texture coordinates")
+    return _lines(f'"{row["name"]}": {row["triangles"]:_} triangles, {coordinates[row["uv_sets"]]}' for row in rows)
 
 
 def material_texts(rows: Sequence[Mapping[str, Any]]) -> list[str]:

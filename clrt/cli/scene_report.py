@@ -11,7 +11,7 @@ from ..rendering.accumulation.first_hits import first_hit_program
 from ..rendering.aovs import seen_first
 from ..rendering.compile.compile_scene import CompiledScene
 from ..scene.model import Scene
-from .scene_lists import light_texts, material_texts
+from .scene_lists import light_texts, material_texts, mesh_texts
 
 
 def scene_report(scene: Scene, compiled: CompiledScene, aovs: Collection[str]) -> dict[str, Any]:
@@ -77,15 +77,16 @@ def _program(scene: Scene, compiled: CompiledScene, aovs: Collection[str]) -> di
 
 
 def report_lines(report: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of a report with the lists `material_list` and `light_list`."""
+    """Yield the lines of a report with the lists `mesh_list`, `material_list` and `light_list`."""
     for name, value in report.items():
-        if name in ("material_list", "light_list"):
+        if name in ("mesh_list", "material_list", "light_list"):
             continue
         if isinstance(value, dict):
             value = "  ".join(f"{key} {_short(part)}" for key, part in value.items()) or "none"
         elif isinstance(value, list):
             value = ("; " if name == "left_out" else " ").join(value) or "none"
         yield f"{name:13} {_short(value)}"
+    yield from (f"{'mesh':13} {line}" for line in mesh_texts(report["mesh_list"]))
     yield from (f"{'material':13} {line}" for line in material_texts(report["material_list"]))
     yield from (f"{'light':13} {line}" for line in light_texts(report["light_list"]))
 

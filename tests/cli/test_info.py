@@ -51,6 +51,7 @@ material = "shell"
         'sphere "bulb": radiance 3 2 1',
     ]
     found = json.loads(clrt("info", "a.toml", "--json", cwd=tmp_path).stdout)
+    assert found["mesh_list"][0] == {"name": "mesh", "triangles": 1, "uv_sets": 1}
     assert found["material_list"][0] == {
         "name": "shell",
         "type": "metallic_roughness",
