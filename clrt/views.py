@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from itertools import tee
+from itertools import islice, tee, zip_longest
 from typing import Annotated, Any, Unpack, cast
 
 import numpy as np
@@ -160,13 +160,8 @@ def _chosen(layers: str | Iterable[str]) -> tuple[str, ...]:
 
 def _with_next(cameras: Iterable[Camera]) -> Iterator[tuple[Camera, Camera | None]]:
     """Yield each camera with the one after it."""
-    before = None
-    for camera in cameras:
-        if before is not None:
-            yield before, camera
-        before = camera
-    if before is not None:
-        yield before, None
+    ahead, following = tee(cameras)
+    return zip_longest(ahead, islice(following, 1, None))
 
 
 def _flow(position: NDArray[Any], hit: NDArray[np.bool_], following: Camera | None) -> NDArray[np.float32]:

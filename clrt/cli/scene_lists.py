@@ -23,7 +23,7 @@ GROUP = "light_group"
 
 
 def meshes_in(scene: Scene) -> list[dict[str, Any]]:
-    """Return the name of each mesh, also of those that instances show, its triangles and sets of texture coordinates."""
+    """Return each mesh's name, triangles and sets of texture coordinates, also of meshes that instances show."""
     distinct = {id(mesh): mesh for mesh in (*scene.meshes, *(each.mesh for each in scene.instances))}
     return [
         {

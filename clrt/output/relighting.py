@@ -12,6 +12,7 @@ from ..errors import SceneError, UsageError, did_you_mean
 from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from ..formats.images.image_reader import read_layers, read_named_layers
+from ..scene.fields.field_types import FLOAT32_MAX
 from ..scene.fields.keywords import with_known_keywords
 from .image import Image
 
@@ -41,6 +42,8 @@ def relight(image: Image | StrPath, factors: Mapping[str, Factor]) -> Image:
     pixels = np.zeros_like(next(iter(groups.values())), np.float64)
     for group, layer in groups.items():
         pixels += scales.get(group, 1.0) * layer
+    if pixels.max(initial=0) > FLOAT32_MAX:
+        raise UsageError("the light groups' factors make pixels brighter than float32 can store; give smaller ones")
     return Image(pixels.astype(np.float32), alpha=alpha)
 
 

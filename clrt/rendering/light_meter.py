@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..scene.editing import materials_of, with_material
 from ..scene.model import Scene
+from ..scene.on_ground import on_plain_ground
 from ..scene.ray_list import REPLICAS, RayList
 from .film.film import Film
 from .renderer import Renderer
@@ -82,7 +83,10 @@ class LightMeter:
         if self._renderer is not None:
             options["before"], options["device"] = self._renderer, self._renderer.devices
             options.pop("on_phase", None)
-        self._renderer = Renderer(replace(self._scene, camera=rays, render=settings), **options)
+        # The light is that of the scene's exposure; rays have no rows, which could open one after the other.
+        seen = replace(rays, shutter=self._scene.camera.shutter)
+        measured = on_plain_ground(replace(self._scene, camera=seen, render=settings))
+        self._renderer = Renderer(measured, **options)
         self._lists += 1
         return self._renderer
 

@@ -175,6 +175,12 @@ class Camera(Validated):
 
     def _faults_at_end(self) -> list[str]:
         if self.end is not None:
+            zoomed = self.end.fov_degrees not in (None, self.fov_degrees)
+            if zoomed and self.projection in ("fisheye", "equirectangular"):
+                return [
+                    f"end.fov_degrees: {show(self.end.fov_degrees)} has no effect with projection = "
+                    f'"{self.projection}"; leave it out'
+                ]
             try:
                 self.at_end.check()
             except ObjectError as error:  # of making it

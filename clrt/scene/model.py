@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +55,7 @@ class Mesh(Editable):
     of length 0, and textures in the material without texture coordinates.
     """
 
+    remedy: ClassVar[str] = "write a clrt.Mesh"
     vertices: FloatArray
     faces: IntArray
     material: Material = field(default_factory=Diffuse)
@@ -123,12 +124,9 @@ class Instance(Editable):
     to_world_end: NDArray[np.float64] | None = None
     pivot: NDArray[np.float64] | None = None
 
-    def __post_init__(self) -> None:
-        """Convert numbers to float64 and four rows to three."""
-        for name in MATRICES:
-            if (matrix := getattr(self, name)) is not None:
-                setattr(self, name, _three_rows(matrix))
-        super().__post_init__()
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Convert the numbers of matrices to float64 and four rows to three."""
+        super().__setattr__(name, _three_rows(value) if name in MATRICES and value is not None else value)
 
     @property
     def title(self) -> str:

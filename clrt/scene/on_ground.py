@@ -9,6 +9,7 @@ import numpy as np
 
 from .materials.material_types import Diffuse
 from .model import Ground, Mesh, Scene
+from .ray_list import RayList
 
 #: Integrators whose images have a ground, and those of them that support catchers.
 LIGHT = ("path", "direct", "local", "raster")
@@ -42,9 +43,10 @@ def on_plain_ground(scene: Scene) -> Scene:
 
 
 def is_below(scene: Scene) -> bool:
-    """Return whether the camera is below the ground, which would hide the scene."""
-    position = getattr(scene.camera, "position", None)
-    return scene.ground is not None and position is not None and position[1] < scene.ground.height
+    """Return whether the camera is below the ground, which would hide the scene; rays given one by one are not."""
+    if scene.ground is None or isinstance(scene.camera, RayList):
+        return False
+    return scene.camera.position[1] < scene.ground.height
 
 
 @lru_cache(maxsize=8)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .model import Instance, Mesh, Scene
+from .model import Environment, Instance, Mesh, Scene
 
 log = logging.getLogger(__name__)
 Doubles = NDArray[np.float64]
@@ -34,7 +34,9 @@ def moving_between(start: Scene, end: Scene) -> Scene:
     moves = {i: path for i, (one, other) in enumerate(pairs) if (path := paths.of(one, other)) is not None}
     deforming = len(start.meshes) - len(moves) - sum(_alike(*pair) for pair in pairs)
     if deforming:
-        _warn(start.name, deforming)
+        _warn(start.name, f"{deforming} meshes deform, appear or vanish")
+    if start.lights != end.lights or not _same_sky(start.environment, end.environment):
+        _warn(start.name, "lights or the environment change")
     centers = [np.mean(points, axis=0) for points in paths.points]
     meshes = [mesh for i, mesh in enumerate(start.meshes) if i not in moves]
     moved = [
@@ -43,14 +45,23 @@ def moving_between(start: Scene, end: Scene) -> Scene:
         )
         for i, path in moves.items()
     ]
-    camera = start.camera if start.camera == end.camera else start.camera.moving_to(end.camera)
+    rests = start.camera == end.camera
+    camera = replace(start.camera, end=None) if rests else start.camera.moving_to(end.camera)
     return replace(start, meshes=meshes, instances=[*_moved(start.instances, end.instances), *moved], camera=camera)
 
 
 @cache
-def _warn(name: str, meshes: int) -> None:
+def _warn(name: str, what: str) -> None:
     """Log a warning, once for all frames."""
-    log.warning("%s: %d meshes deform, appear or vanish while the shutter is open; they are not blurred", name, meshes)
+    log.warning("%s: %s while the shutter is open; they are not blurred", name, what)
+
+
+def _same_sky(one: Environment, other: Environment) -> bool:
+    if one is other:
+        return True
+    names = [field.name for field in fields(one) if field.name != "image"]
+    same_image = one.image is other.image or np.array_equal(one.image, other.image)  # type: ignore[arg-type]
+    return same_image and all(getattr(one, name) == getattr(other, name, None) for name in names)
 
 
 class _Paths:

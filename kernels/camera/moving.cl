@@ -14,6 +14,10 @@ static inline Launch camera_at(const Launch *launch, float s) {
         axes[axis][1] = along(r.y, own);
         axes[axis][2] = along(r.z, own);
     }
+#if LENS_MOTION
+    for (int k = 0; k < 3; ++k) now.across[k] = fma(s, launch->across_change[k], launch->across[k]);
+    for (int k = 0; k < 3; ++k) now.down[k] = fma(s, launch->down_change[k], launch->down[k]);
+#endif
     for (int k = 0; k < 3; ++k) now.position[k] = fma(s, launch->moved[k], launch->position[k]);
     return now;
 }

@@ -27,6 +27,11 @@ def test_icosphere_is_a_closed_sphere_of_even_triangles(subdivisions: int) -> No
     assert len(faces) == 20 * 4**subdivisions and len(vertices) == len(faces) // 2 + 2, "Euler's formula"
     edges = Counter(map(tuple, np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).tolist()))
     assert set(edges.values()) == {2}
+    directed = set(map(tuple, faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).tolist()))
+    assert len(directed) == 3 * len(faces), "all faces turn the same way"
+    corners = vertices[faces].astype(np.float64)
+    volume = np.linalg.det(corners).sum() / 6
+    assert 0.6 * 4 / 3 * np.pi < volume < 4 / 3 * np.pi, "outwards"
     np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1, atol=1e-6)
     assert areas(vertices, faces).max() < 2 * areas(vertices, faces).min()
     if subdivisions == 0:

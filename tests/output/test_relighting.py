@@ -53,6 +53,8 @@ def test_mistakes(tmp_path: Path) -> None:
     ):
         clrt.relight(image, {"kye": 1})
     wrong: tuple[Any, ...] = (-1, float("nan"), (1, 2), float("inf"), "half", (1, "x", 2), [[1], []], None, {}, 1j)
+    with pytest.raises(UsageError, match="brighter than float32 can store"):
+        clrt.relight(image, {"key": 3e38, "fill": 3e38})
     for factor in wrong:
         with pytest.raises(UsageError, match="light group 'key': .* is not a factor; give a number of at least 0"):
             clrt.relight(image, {"key": factor})

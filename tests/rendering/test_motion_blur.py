@@ -159,6 +159,25 @@ def test_a_rolling_shutter_shears_an_edge(device: Device, moves: str, opened: fl
     assert agrees(film(device, scene), white)
 
 
+@pytest.mark.parametrize("aperture", [0.0, 0.1])
+def test_a_distorting_lens_zooms(device: Device, aperture: float) -> None:
+    """With hardly any distortion a zoom is that of the lens without distortion, in light and in data."""
+    camera = Camera(position=(0, 0, 5), fov_degrees=30, shutter=(0, 1), aperture_radius=aperture)
+    camera = replace(camera, end=CameraEnd(fov_degrees=90))
+    ball = Sphere(radius=1, material=Diffuse(color=(0.5, 0.5, 0.5)))
+    scene = Scene(spheres=[ball], environment=WHITE, render=RenderSettings(size=(32, 32), spp=64, transparent=True))
+    options: dict[str, Any] = {"device": device.info.index, "aovs": ["depth", "normal"]}
+    one, other = (
+        clrt.render(replace(scene, camera=each), **options)
+        for each in (camera, replace(camera, distortion=(1e-7, 0.0, 0.0, 0.0)))
+    )
+    assert one.alpha is not None and other.alpha is not None
+    np.testing.assert_allclose(other.alpha, one.alpha, atol=2e-2)
+    np.testing.assert_allclose(other.alpha.mean(), one.alpha.mean(), rtol=1e-4)
+    depth, same = (np.asarray(each.aovs["depth"], np.float32) for each in (one, other))
+    np.testing.assert_allclose(same, depth, rtol=1e-4)
+
+
 def random_scene(rng: np.random.Generator, kind: str) -> tuple[list[Instance], Scene]:
     """Return moving instances, without a scene around them, and that scene."""
     vertices, faces = rays.icosphere(1)

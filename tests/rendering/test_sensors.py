@@ -242,6 +242,32 @@ def test_ambient_occlusion_under_a_disc(device: Device, scale: float) -> None:
             assert limit < 0.02 and seen.value[0] == pytest.approx(1 - opacity * part, abs=limit)
 
 
+@pytest.mark.parametrize("height", [-3.0, 3.0])
+def test_a_ground_at_any_height_hides_half_of_the_sky(device: Device, height: float) -> None:
+    """Also that of a bare model, which is a plane to a point right above it, facing down and to the side."""
+    scene = clrt.Scene(environment=clrt.Environment(color=(1, 1, 1)), ground=clrt.Ground(height=height, radius=1e4))
+    points, normals = np.full((2, 3), (0, height + 0.1, 0)), [(0, -1, 0), (1, 0, 0)]
+    measured = clrt.irradiance(scene, points, normals, spp=256, device=device.info.index)
+    # Half of the light that meets a floor of albedo one half comes back.
+    np.testing.assert_allclose(measured.value[:, 0] / np.pi, [0.5, 0.75], rtol=0.02)
+    occlusion = clrt.ambient_occlusion(scene, points, normals, spp=256, device=device.info.index)
+    np.testing.assert_allclose(occlusion.value, [0, 0.5], atol=0.02)
+
+
+def test_moving_lights_are_measured_over_the_exposure(device: Device) -> None:
+    corner, e1, e2 = np.array([-0.5, 3.0, -0.5]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    end = np.eye(3, 4)
+    end[0, 3] = 20
+    panel = clrt.Instance(quad(corner, e1, e2, emission=(10, 10, 10)), to_world_end=end)
+    scene = clrt.Scene(instances=[panel], environment=BLACK, camera=clrt.Camera(shutter=(0, 1)))
+    points, normals = np.array([(0.0, 0.0, 0.0), (9.0, 0.5, 1.0)]), np.array([(0.0, 1.0, 0.0)] * 2)
+    corners = np.array([corner, corner + e1, corner + e1 + e2, corner + e2])
+    moments = (np.arange(2000) + 0.5) / 2000
+    expected = 10 * np.mean([lambert(points, normals, corners + [20 * s, 0, 0]) for s in moments], axis=0)
+    measured = clrt.irradiance(scene, points, normals, spp=65536, device=device.info.index)
+    np.testing.assert_allclose(measured.value[:, 0], expected, rtol=0.02)
+
+
 def test_arrays_that_are_no_rays(device: Device) -> None:
     scene = clrt.Scene(environment=BLACK)
     assert clrt.radiance(scene, np.zeros((0, 3)), np.zeros((0, 3))).value.shape == (0, 3)

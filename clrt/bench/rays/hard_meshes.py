@@ -17,6 +17,9 @@ def icosphere(subdivisions: int) -> Mesh:
     i, j, k = np.array([(i, j, k) for i in range(12) for j in range(i) for k in range(j)]).T
     edges = [np.linalg.norm(vertices[a] - vertices[b], axis=1) for a, b in ((i, j), (j, k), (k, i))]
     faces = np.stack([i, j, k], axis=1)[np.all(np.isclose(edges, 2), axis=0)]
+    corners = vertices[faces]
+    inwards = np.einsum("fi,fi->f", np.cross(corners[:, 1], corners[:, 2]), corners[:, 0]) < 0
+    faces[inwards] = faces[inwards, ::-1]
     mesh = vertices.astype(np.float32), faces.astype(np.int32)
     for step in range(subdivisions + 1):
         points, faces = subdivide(*mesh) if step else mesh

@@ -8,7 +8,8 @@ from typing import Literal, Protocol, get_args
 
 from ...errors import UsageError, check_choice
 from ...file_names import StrPath
-from ...scene.cameras import CALIBRATED
+from ...scene.cameras import CALIBRATED, Camera
+from ...scene.exposure import camera_at
 from ...scene.fields.keywords import with_known_keywords
 from ...scene.model import Scene
 from ...scene.numbered_objects import object_names
@@ -53,9 +54,10 @@ def save_views(
     - "coco": annotations.json, masks as run lengths and boxes of the objects, from the layer "instance_id"; its
       categories are the objects' names
 
-    Cameras may have lens distortion: as OPENCV and OPENCV_FISHEYE, in COLMAP's model FULL_OPENCV, too. Raises
-    OutputError, and UsageError for another format, for a camera that is neither perspective nor fisheye or has skew,
-    for distortion that a format lacks, and for layers that it lacks.
+    Poses of cameras that move during the exposure are those at its middle. Cameras may have lens distortion: as OPENCV
+    and OPENCV_FISHEYE, in COLMAP's model FULL_OPENCV, too. Raises OutputError, and UsageError for another format, for a
+    camera that is neither perspective nor fisheye or has skew, for distortion that a format lacks, and for layers that
+    it lacks.
     """
     chosen = (formats,) if isinstance(formats, str) else tuple(formats)
     for each in chosen:
@@ -66,7 +68,7 @@ def save_views(
     writers = [WRITERS[each](path, scene) for each in chosen]
     for number, view in enumerate(views):
         _check_calibrated(view, number)
-        saved = save_view(path, f"view_{number:05}", view.camera, view.layers)
+        saved = save_view(path, f"view_{number:05}", _in_the_middle(view), view.layers)
         for writer in writers:
             writer.add(saved)
     for writer in writers:
@@ -79,3 +81,9 @@ def _check_calibrated(view: View, number: int) -> None:
     if camera.projection not in CALIBRATED or camera.skew:
         what = f"skew {camera.skew:g}" if camera.skew else f"projection {camera.projection!r}"
         raise UsageError(f"view {number} has {what}; datasets hold perspective and fisheye cameras without skew")
+
+
+def _in_the_middle(view: View) -> Camera:
+    """Return the camera at the middle of its exposure, to which the layers of geometry belong."""
+    camera = view.camera
+    return camera_at(camera, 0.5) if camera.moves else camera

@@ -12,7 +12,7 @@ from ...scene.cameras import Camera, View
 from ...scene.exposure import frame_of_camera
 from ...scene.geometry.motion import Turns
 from ...scene.ray_list import RayList
-from .records import CAMERA_MOTION, EXPOSURE, LAUNCH, LENS, LISTED_RAY
+from .records import CAMERA_MOTION, EXPOSURE, LAUNCH, LENS, LENS_MOTION, LISTED_RAY
 
 #: Camera fields of every launch record.
 CAMERA_FIELDS = ("position", "right", "up", "forward", "lens_radius")
@@ -44,7 +44,7 @@ def camera_buffers(camera: Camera) -> Buffers:
 def camera_defines(camera: Camera) -> dict[str, int]:
     """Return the macros that its kernel file reads."""
     if not isinstance(camera, RayList):
-        return {}
+        return {"LENS_MOTION": 1} if camera.type.distorts and camera.moves else {}
     return {"REPLICAS": camera.replicas, **({"ON_SURFACES": 1} if camera.on_surfaces else {})}
 
 
@@ -52,12 +52,16 @@ def launch_of(camera: Camera, kind: np.dtype[Any] = LAUNCH) -> np.dtype[Any]:
     """Return a launch record of a kind with the lens's distortion if the camera's kernel file reads that, and with the
     camera's motion if it moves."""
     lens, motion = LENS.descr * camera.type.distorts, CAMERA_MOTION.descr * camera.moves
-    return np.dtype([*kind.descr, *lens, *motion]) if lens or motion else kind
+    both = LENS_MOTION.descr * (camera.type.distorts and camera.moves)
+    return np.dtype([*kind.descr, *lens, *motion, *both]) if lens or motion else kind
 
 
 def camera_fields(kind: np.dtype[Any]) -> list[str]:
     """Return the names of the fields of a launch record that depend on the camera."""
-    theirs = {*CAMERA_FIELDS, *(name for each in (LENS, CAMERA_MOTION, EXPOSURE) for name in each.names or ())}
+    theirs = {
+        *CAMERA_FIELDS,
+        *(name for each in (LENS, CAMERA_MOTION, LENS_MOTION, EXPOSURE) for name in each.names or ()),
+    }
     return [name for name in kind.names or () if name in theirs]
 
 
@@ -102,13 +106,20 @@ def _set_motion(record: NDArray[Any], camera: Camera, size: tuple[int, int]) -> 
 
 
 def _set_lens(record: NDArray[Any], camera: Camera, size: tuple[int, int]) -> None:
-    """Set the fields of LENS."""
-    lens, (width, height) = camera.lens, size
-    pixels = np.array([[width / 2, 0, width / 2], [0, height / 2, height / 2], [0, 0, 1]])  # of (sx, sy, 1)
-    plane = np.linalg.solve(camera.matrix(size), pixels)
+    """Set the fields of LENS, and those of LENS_MOTION if the camera moves."""
+    lens, plane, end = camera.lens, _plane(camera, size), _plane(camera.at_end, size)
     farthest = 1 + 2 * BEYOND / np.array(size)
     corners = np.array([(x, y, 1) for x in (-farthest[0], farthest[0]) for y in (-farthest[1], farthest[1])])
-    edge = float(np.linalg.norm(corners @ plane[:2].T, axis=1).max())
+    edge = max(float(np.linalg.norm(corners @ each[:2].T, axis=1).max()) for each in (plane, end))
     record["numerator"], record["denominator"], record["reach"] = lens.numerator, lens.denominator, lens.reach(edge)
     record["across"], record["down"], _ = plane
     record["p1"], record["p2"] = lens.tangential
+    if camera.moves:
+        record["across_change"], record["down_change"], _ = end - plane
+
+
+def _plane(camera: Camera, size: tuple[int, int]) -> NDArray[np.float64]:
+    """Return the matrix (3, 3) from image positions (sx, sy, 1) to the image plane at distance 1."""
+    width, height = size
+    pixels = np.array([[width / 2, 0, width / 2], [0, height / 2, height / 2], [0, 0, 1]])
+    return np.linalg.solve(camera.matrix(size), pixels)

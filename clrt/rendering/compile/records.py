@@ -131,6 +131,8 @@ CAMERA_MOTION = record(
     axes_change="(3,3)f4",
     pad_axes="2i4",
 )
+#: The change of a distorting lens's image plane (kernels/camera/moving.cl), if the camera moves.
+LENS_MOTION = record(across_change="3f4", pad_across="i4", down_change="3f4", pad_down="i4")
 #: A ray of a RayList (kernels/camera/listed_rays.cl).
 LISTED_RAY = record(origin="3f4", reach="f4", direction="3f4", pad0="i4", surface_normal="3f4", pad1="i4")
 TEXTURE = record(

@@ -10,7 +10,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from datetime import date, datetime, time
 from functools import lru_cache, reduce
 from types import NoneType, UnionType
@@ -37,7 +37,7 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
     plain = {name: plain_value(value) for name, value in values.items()}
     hints = field_types(kind)
     problems: list[str] = []
-    for field in fields(kind):
+    for field in fields_of(kind):
         if field.name in plain:
             problems += _problems(hints[field.name], plain[field.name], f"{where}.{field.name}")
         elif field.default is MISSING and field.default_factory is MISSING:
@@ -94,6 +94,11 @@ def field_types(kind: type) -> dict[str, Any]:
     return _field_types(kind)
 
 
+def fields_of(kind: type) -> tuple[Field[Any], ...]:
+    """Return a dataclass's fields, without the time that `fields` takes."""
+    return _fields_of(kind)
+
+
 def array_fields(kind: type) -> frozenset[str]:
     """Return the names of a dataclass's fields that are arrays, or None."""
     return _array_fields(kind)
@@ -103,6 +108,11 @@ def array_fields(kind: type) -> frozenset[str]:
 def _field_types(kind: type) -> dict[str, Any]:
     hints = get_type_hints(kind, include_extras=True)
     return {field.name: Any if _is_opaque(hints[field.name]) else hints[field.name] for field in fields(kind)}
+
+
+@lru_cache
+def _fields_of(kind: type) -> tuple[Field[Any], ...]:
+    return fields(kind)
 
 
 @lru_cache

@@ -7,4 +7,4 @@ from typing import Annotated
 from .limits import Characters
 
 #: Layer names in files are built from a group's name, with dots between their parts.
-GroupName = Annotated[str, Characters(r"[A-Za-z0-9_-]*", "letters, digits, - and _")]
+GroupName = Annotated[str, Characters(r"[A-Za-z0-9_-]{0,100}", "up to 100 letters, digits, - and _")]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Container
-from dataclasses import fields
 from typing import Any
+
+from .field_types import fields_of
 
 
 def tuples_for_lists(record: Any, without: Container[str] = ()) -> None:
@@ -13,7 +14,7 @@ def tuples_for_lists(record: Any, without: Container[str] = ()) -> None:
 
     without: names of fields that keep arrays.
     """
-    for field in fields(record):
+    for field in fields_of(type(record)):
         if field.name not in without and (plain := _plain(value := getattr(record, field.name))) is not value:
             object.__setattr__(record, field.name, plain)
 

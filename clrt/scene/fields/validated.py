@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields
 from typing import Any, Self
 
 from ...errors import ObjectError
-from .field_types import array_fields, field_problems, field_types, unknown, usable
+from .field_types import array_fields, field_problems, field_types, fields_of, unknown, usable
 from .tuples import tuples_for_lists
 
 
@@ -19,7 +18,8 @@ class KnownFields:
         return super().__new__(cls)
 
     def __setattr__(self, name: str, value: object) -> None:
-        _check_known(type(self), (name,))
+        if name not in field_types(type(self)):
+            _check_known(type(self), (name,))
         super().__setattr__(name, value)
 
 
@@ -55,8 +55,10 @@ class Validated(KnownFields):
 
     def _given(self) -> dict[str, Any]:
         """Return the fields that are not the defaults, which are valid."""
-        values = [(field, getattr(self, field.name)) for field in fields(self)]  # type: ignore[arg-type]
-        return {field.name: value for field, value in values if value is not field.default}
+        values = vars(self)
+        return {
+            field.name: values[field.name] for field in fields_of(type(self)) if values[field.name] is not field.default
+        }
 
     def conflicts(self) -> list[str]:
         """Return what is wrong with fields whose types are right: "FIELD: fault; remedy"."""
