@@ -57,7 +57,7 @@ class FrameOptions:
         "--turntable",
         type=click.IntRange(min=1),
         metavar="N",
-        help="Orbit once around the point the camera looks at, in N frames.",
+        help="Orbit once around a bare model, or the point that a scene's camera looks at, in N frames.",
     )
     turns: Turns | None = flag(
         "--turntable-turns",

@@ -18,12 +18,12 @@ from ..errors import SceneError, UsageError, check_choice
 from ..file_names import StrPath
 from ..scene.axes_and_units import CONVERTED, Axis, Unit
 from ..scene.fields.field_types import field_problems
+from ..scene.frame_model import VIEWS, frame
 from ..scene.geometry.transform import rotation, translation
-from ..scene.model import Instance, Mesh, Model, RenderSettings, Scene
+from ..scene.model import Framing, Instance, Mesh, Model, RenderSettings, Scene
 from ..scene.model_pose import with_poses
 from ..scene.provenance import source_of_model
 from ..scene.validation.validate import scene_problems
-from .frame_model import VIEWS, frame
 from .model_choice import DEFAULT, ModelChoice
 from .model_look import Look, default_look, look_of
 from .models import SUFFIXES, read_model
@@ -163,10 +163,15 @@ def _load_model(
     width, height = size or RenderSettings.size
     framed = _framed(model, moving or choice.animation is not None)
     camera = model.cameras.get(view or next(iter(model.cameras), "")) if angle is None else None
+    framing = None
     if camera is None:
         camera = frame(*framed, rotation((0.0, angle or 0.0, 0.0)), width / height)
+        framing = Framing(camera, model.meshes, model.instances)
     look = look or default_look(model)
     contents = {**model.contents, "look": [look]}
+    source = source_of_model(
+        path, replace(model, contents=contents), placing, whole=replace(choice, light_unit=None) == DEFAULT
+    )
     return Scene(
         meshes=model.meshes + model.emitters,
         instances=model.instances,
@@ -174,9 +179,7 @@ def _load_model(
         cameras=model.cameras,
         name=name_of(path),
         animation=model.animation,
-        source=source_of_model(
-            path, replace(model, contents=contents), placing, whole=replace(choice, light_unit=None) == DEFAULT
-        ),
+        source=replace(source, framing=framing),
         **look_of(look, model, camera, angle or 0.0, framed),
     )
 

@@ -10,10 +10,10 @@ from typing import Any, Literal
 import numpy as np
 
 from ..scene.default_sky import SUN, default_sky
+from ..scene.frame_model import bounds
 from ..scene.geometry.transform import rotation, transform_light
 from ..scene.model import Camera, Display, Environment, Ground, Instance, Mesh, Model, RenderSettings
 from ..scene.studio import CAMERA_AZIMUTH, FLOOR_COLOR, KEY, studio
-from .frame_model import bounds
 
 Look = Literal["studio", "sky", "none"]
 #: Half the side of the ground, in diagonals of the model's bounding box: its shadow is shorter, and at the edge the

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import SceneError
-from ..scene.model import CONVERSIONS, Model, Scene as Scene
+from ..scene.model import CONVERSIONS, Model, Scene as Scene, Source
 
 
 def is_trimesh(model: object) -> bool:
@@ -21,7 +21,8 @@ def is_trimesh(model: object) -> bool:
 def scene_of(model: object, load: Callable[[Path], Scene]) -> Scene:
     """Return what `load` makes of a .glb file of the model. Raises SceneError if trimesh cannot write one."""
     with _exported(model) as path:
-        return replace(load(path), source=None)
+        scene = load(path)
+    return replace(scene, source=Source(framing=scene.source.framing if scene.source else None))
 
 
 def _model_of(model: object) -> Model | None:

@@ -12,6 +12,7 @@ from ..errors import SceneError, UsageError, check_choice
 from .animation import Animation, Keyframe, ModelAnimation, SceneAnimation, Turns
 from .fields.field_types import field_problems, show
 from .fields.keywords import with_known_keywords
+from .frame_model import frame_turning
 from .geometry.transform import rotation, transform_light, translation
 from .model import Camera, Scene
 from .model_pose import posed
@@ -27,8 +28,10 @@ MOST_FRAMES = 1_000_000
 def turntable(scene: Scene, frames: int, fps: float = Animation.fps, turns: Turns = "camera") -> Scene:
     """Return the scene with the camera going once around in this number of frames, while a scene file's models move.
 
-    turns: with "object", environment and lights go around with the camera, as if the objects turned instead. Raises
-    UsageError unless `frames` is at least 1, `fps` is above 0 and finite, and `turns` is known.
+    It goes around its look_at point. A camera that still frames a bare model, as `load` placed it, goes around the
+    model's center instead, at a distance at which the model stays inside an image of the scene's size. turns: with
+    "object", environment and lights go around with the camera, as if the objects turned instead. Raises UsageError
+    unless `frames` is at least 1, `fps` is above 0 and finite, and `turns` is known.
     """
     if not frames >= 1:
         raise UsageError(f"frames is {frames}; it must be at least 1")
@@ -36,6 +39,11 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps, turns: Turn
         raise UsageError(f"fps is {fps}; it must be above 0 and finite")
     check_choice("turns", turns, get_args(Turns))
     around = Animation(fps=fps, turntable_seconds=frames / fps, turntable_turns=turns)
+    framing = scene.source.framing if scene.source else None
+    if framing is not None and scene.camera == framing.camera:
+        width, height = scene.render.size
+        camera = frame_turning(framing.meshes, framing.instances, scene.camera, width / height)
+        scene = replace(scene, camera=camera)
     if isinstance(scene.animation, SceneAnimation):
         return replace(scene, animation=replace(scene.animation, camera=around, fps=fps))
     return replace(scene, animation=around)

@@ -269,15 +269,26 @@ class Origin:
 
 
 @dataclass(eq=False)
+class Framing:
+    """The camera that frames a bare model, and what it frames, without the model's emitters."""
+
+    camera: Camera
+    meshes: list[Mesh]
+    instances: list[Instance]
+
+
+@dataclass(eq=False)
 class Source:
     """Sources of a scene. meshes, instances: tables in their order. files: textures' pictures and environment maps,
-    each with its file. cameras: those of model files. contents: see `Model`."""
+    each with its file. cameras: those of model files. contents: see `Model`. framing: of a bare model without a camera.
+    """
 
     meshes: list[Origin] = field(default_factory=list)
     instances: list[Origin] = field(default_factory=list)
     files: list[tuple[object, Path]] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
     contents: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    framing: Framing | None = None
 
     @property
     def paths(self) -> list[Path]:

@@ -13,11 +13,11 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.errors import SceneError
-from clrt.formats.frame_model import bounds
 from clrt.formats.load_scene import load
 from clrt.formats.model_choice import ModelChoice
 from clrt.formats.models import read_model
 from clrt.formats.usd.reader import read_usd
+from clrt.scene.frame_model import bounds
 from clrt.scene.geometry.instancing import baked
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Mesh, Model

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from ...errors import SceneError
 from ...scene.animation import ModelAnimation
+from ...scene.frame_model import bounds
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.normals import Normals
 from ...scene.geometry.transform import Matrix, translation
 from ...scene.model import Mesh, Model
 from ...scene.model_pose import own_materials
 from ..far_origin import far_center
-from ..frame_model import bounds
 from ..model_choice import DEFAULT, ModelChoice, chosen
 from ..placed_meshes import shown
 from . import schema as gltf

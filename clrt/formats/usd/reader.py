@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from ...errors import SceneError
 from ...file_names import printable
 from ...scene.animation import ModelAnimation
+from ...scene.frame_model import bounds
 from ...scene.geometry.normals import Normals
 from ...scene.geometry.transform import Matrix, scaling, translation
 from ...scene.model import Mesh, Model, Vector
 from ..archives import check_archive
 from ..decoder import decode
 from ..far_origin import far_center
-from ..frame_model import bounds
 from ..model_choice import DEFAULT, ModelChoice, chosen
 from ..placed_meshes import shown
 from ..referenced_files import note_read

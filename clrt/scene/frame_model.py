@@ -1,4 +1,4 @@
-"""A camera that frames a whole model."""
+"""Cameras that frame a whole model: one for a still, and one that a turntable starts with."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.geometry.instancing import meshes_by_id
-from ..scene.geometry.transform import Matrix
-from ..scene.model import Camera, Instance, Mesh
+from .geometry.instancing import meshes_by_id
+from .geometry.transform import Matrix
+from .model import Camera, Instance, Mesh
 
 #: Views of a model by name: angle about +Y in degrees from the front. glTF defines +Z as the front, and viewers assume
 #: it for OBJ and PLY, but some models face the other way.
@@ -20,6 +20,8 @@ THREE_QUARTER = (0.53, 0.34, 1.0)
 FOV_DEGREES = 30.0
 #: Fraction of an image's width or height, whichever is tighter, that the model fills.
 FILL = 0.92
+#: Tangent of half the vertical field of view that the model may fill.
+SLOPE = FILL * math.tan(math.radians(FOV_DEGREES) / 2)
 #: Maximum number of iterations that center the model along the looser axis; it converges after 3 to 6.
 ROUNDS = 20
 
@@ -36,20 +38,43 @@ def frame(
     FILL of the image's width or height, and its left and right margins are equal, as are the top and bottom ones.
     turn: rotation of the camera about +Y; aspect: the image's width over its height.
     """
-    back = turn[:3, :3] @ THREE_QUARTER / np.linalg.norm(THREE_QUARTER)
-    right = np.cross([0.0, 1.0, 0.0], back) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], back))
-    axes = np.array([right, np.cross(back, right), back])
+    axes = _axes(turn[:3, :3] @ THREE_QUARTER)
     vertices = _extremes(meshes, instances)
-    middle = vertices.min(axis=0) / 2 + vertices.max(axis=0) / 2
+    middle = _middle(vertices)
     x, y, z = axes @ (vertices - middle).T
     x /= aspect  # in a square image the same camera would see it so
-    # From (cx, cy, d) a vertex is inside if |x - cx| <= slope (d - z): cx + slope d and slope d - cx have lower bounds,
-    # whose sum bounds d alone.
-    slope = FILL * math.tan(math.radians(FOV_DEGREES) / 2)
-    distance = max(float(np.max(slope * z + s) + np.max(slope * z - s)) for s in (x, y)) / (2 * slope)
+    distance = max(_nearest(x, z), _nearest(y, z))
     distance = distance if distance > 0 else 1.0
     center = middle + np.array([aspect * _center(x, z, distance), _center(y, z, distance), 0.0]) @ axes
-    return Camera(position=_vector(center + distance * back), look_at=_vector(center), fov_degrees=FOV_DEGREES)
+    return Camera(position=_vector(center + distance * axes[2]), look_at=_vector(center), fov_degrees=FOV_DEGREES)
+
+
+def frame_turning(meshes: list[Mesh], instances: Sequence[Instance], still: Camera, aspect: float) -> Camera:
+    """Return the nearest camera in the direction of `still` that has every vertex inside the image in a whole turn.
+
+    The model, or the camera around it, turns about the vertical axis through the center of its bounding box, on which
+    look_at lies. What fills FILL of the image is what the model sweeps, so its size is the same with any number of
+    frames. The other arguments are as in `frame`, which made `still`.
+    """
+    axes = _axes(np.subtract(still.position, still.look_at))
+    vertices = _extremes(meshes, instances)
+    middle = _middle(vertices)
+    vertices -= middle
+    height, radius = vertices[:, 1], np.hypot(vertices[:, 0], vertices[:, 2])
+    (_, cos, _), (_, sin, _) = axes[1:]
+    # A point of a circle at an angle t from the camera is at x = radius sin(t), and z = height sin + radius cos cos(t).
+    # x <= SLOPE aspect (d - z) bounds d by a sine wave of t. Highest and lowest in the image are its nearest and its
+    # furthest point.
+    distance = float(np.max(height * sin + radius * math.hypot(cos, 1 / (SLOPE * aspect))))
+    near = np.concatenate([radius, -radius])
+    height = np.concatenate([height, height])
+    y, z = height * cos - near * sin, height * sin + near * cos
+    distance = max(distance, _nearest(y, z))
+    distance = distance if distance > 0 else 1.0
+    lift = _center(y, z, distance)
+    position = middle + lift * axes[1] + distance * axes[2]
+    look_at = middle + np.array([0.0, lift / cos, 0.0])  # on the axis and on the camera's central ray
+    return Camera(position=_vector(position), look_at=_vector(look_at), fov_degrees=FOV_DEGREES)
 
 
 def bounds(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> tuple[Doubles, Doubles]:
@@ -77,6 +102,27 @@ def _used_vertices(meshes: list[Mesh]) -> Doubles:
         used[mesh.faces] = True
         rows.append(mesh.vertices[used])
     return np.concatenate(rows).astype(np.float64)
+
+
+def _axes(back: Doubles) -> Doubles:
+    """Return the unit vectors right, up and back of an upright camera, (3, 3); back: of any length."""
+    back = back / np.linalg.norm(back)
+    right = np.cross([0.0, 1.0, 0.0], back) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], back))
+    return np.array([right, np.cross(back, right), back])
+
+
+def _middle(vertices: Doubles) -> Doubles:
+    """Return the center of the bounding box, (3,)."""
+    return np.asarray(vertices.min(axis=0) / 2 + vertices.max(axis=0) / 2)
+
+
+def _nearest(x: Doubles, z: Doubles) -> float:
+    """Return the least distance of a camera along z that has all points inside the image along x.
+
+    From (c, d) a point is inside if |x - c| <= SLOPE (d - z): c + SLOPE d and SLOPE d - c have lower bounds, whose sum
+    bounds d alone.
+    """
+    return float(np.max(SLOPE * z + x) + np.max(SLOPE * z - x)) / (2 * SLOPE)
 
 
 def _center(x: Doubles, z: Doubles, distance: float) -> float:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from clrt.errors import SceneError
-from clrt.formats.frame_model import FILL, bounds, frame
 from clrt.formats.load_scene import load
 from clrt.output.scenes import save_scene
 from clrt.scene.default_sky import SUN, default_sky
+from clrt.scene.frame_model import FILL, bounds, frame
 from clrt.scene.geometry.transform import Matrix, rotation, unit
 from clrt.scene.lights import DirectionalLight
 from clrt.scene.model import Mesh
