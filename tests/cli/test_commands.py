@@ -329,6 +329,22 @@ def test_a_scene_without_light_says_so(tmp_path: Path) -> None:
     assert clrt("render", "dark.toml", "-q", cwd=tmp_path).stderr == ""
 
 
+@pytest.mark.parametrize("size", [(64, 48), (30, 80)])
+def test_convert_in_a_size(size: tuple[int, int], tmp_path: Path) -> None:
+    """The scene file has the size, and the camera that frames the model in it; at the default size it has another."""
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 4 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\n")
+    asked = "--size", f"{size[0]}x{size[1]}"
+    assert clrt("convert", "a.obj", "a.toml", *asked, cwd=tmp_path).returncode == 0
+    assert clrt("convert", "a.obj", "square.toml", cwd=tmp_path).returncode == 0
+    for name, *options in (("a.obj", *asked), ("a.toml",), ("square.toml", *asked)):
+        done = clrt("render", name, *options, "-o", f"{name}.exr", "--spp", "2", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    expected, found, other = (read_image(tmp_path / f"{name}.exr") for name in ("a.obj", "a.toml", "square.toml"))
+    assert expected.shape[:2] == size[::-1]
+    np.testing.assert_array_equal(found, expected)
+    assert (other != expected).any()
+
+
 def test_convert(tmp_path: Path) -> None:
     """Converted to another folder, paths stay valid; existing files are not overwritten without --force."""
     (tmp_path / "models").mkdir()
