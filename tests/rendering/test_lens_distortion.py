@@ -19,6 +19,7 @@ from clrt.scene.cameras import Calibrated
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
 
+from ..covering import others
 from .lens_rays import Doubles, rays
 from .pictures import film
 
@@ -67,6 +68,7 @@ def invertible(cv2: Any, places: Doubles, K: Doubles, coefficients: Doubles) -> 
     return increasing
 
 
+@pytest.mark.statistics
 @pytest.mark.needs("cv2")
 def test_rays_are_those_of_opencv(device: Device) -> None:
     """1e5 pixels of random cameras, wherever `undistortPoints` converges to a point that is imaged there."""
@@ -93,6 +95,7 @@ def test_rays_are_those_of_opencv(device: Device) -> None:
     assert np.abs(directions - expected)[given].max() < 1e-5
 
 
+@pytest.mark.statistics
 @pytest.mark.needs("cv2")
 def test_fisheye_rays_are_those_of_opencv(device: Device) -> None:
     """1e5 pixels of random cameras, as far from the axis as `fisheye.undistortPoints` goes, below a right angle."""
@@ -261,7 +264,7 @@ def photograph(device: Device, lens: dict[str, Any], spp: int = 64) -> tuple[Cam
 
 
 @pytest.mark.needs("cv2")
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", [*[*LENSES][:2], *others(*[*LENSES][2:])])
 def test_a_rendered_checkerboard_has_its_corners_where_opencv_projects_them(device: Device, name: str) -> None:
     """Corners refined in the image (saddle points) lie within a tenth of a pixel of `projectPoints`."""
     import cv2
@@ -337,6 +340,7 @@ def test_flow_between_distorted_cameras(device: Device) -> None:
     assert np.isfinite(views["flow"][0]).all() and np.abs(views["flow"][0]).max() > 2
 
 
+@pytest.mark.combinations
 def test_lenses_change_from_view_to_view(device: Device) -> None:
     """Each view is that of a render of its own; between lenses of one kind the program is kept."""
     scene = clrt.load(SCENES / "cornell.toml")

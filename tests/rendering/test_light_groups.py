@@ -318,6 +318,7 @@ def test_a_checkpoint_keeps_the_groups(tmp_path: Path) -> None:
         clrt.Renderer(renamed, spp=24, aovs="light_groups,direct", checkpoint=path, resume=True)
 
 
+@pytest.mark.combinations
 def test_several_devices_store_the_same_groups(device: Device) -> None:
     one, two = (
         clrt.render(grouped(), spp=8, aovs="light_groups", device=devices).light_groups

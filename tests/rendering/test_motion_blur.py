@@ -25,7 +25,7 @@ from clrt.scene.geometry.transform import axis_rotation, rotation, scaling, tran
 from clrt.scene.materials.material_types import Diffuse, Material
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 
-from ..covering import covering
+from ..covering import covering, others
 from . import rays
 from .pictures import film, quad
 from .test_instance_offsets import met_again
@@ -247,7 +247,7 @@ def at_time(device: Device, scene: Scene, s: float, **chosen: Any) -> Probe:
     return Probe(device, scene, f"#define TIME_NOW {s!r}f", SET, **chosen)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("layout", [LAYOUTS[0], *others(*LAYOUTS[1:])])
 def test_rays_hit_what_is_there_at_their_time(device: Device, layout: str) -> None:
     """No ray from inside a closed surface escapes at any time; hits are those of the static mesh, up to rounding at
     edges; and all layouts find the same."""
@@ -349,6 +349,7 @@ def test_only_scenes_with_motion_compile_it(device: Device) -> None:
     ]
 
 
+@pytest.mark.combinations
 def test_depth_and_normals_are_those_of_the_middle(device: Device) -> None:
     """AOVs of one ray are at the middle of the exposure, of the pixel's row; means are over all times; the integrator
     `depth` and the denoiser's guides render, too."""

@@ -97,6 +97,7 @@ def test_a_launch_fits_the_queues(device: Device, monkeypatch: pytest.MonkeyPatc
     assert running.device_bytes - before >= (1 << 11) * slot // 2 and running.device_bytes > (1 << 11) * slot
 
 
+@pytest.mark.combinations
 def test_several_devices_and_resumption(device: Device, tmp_path: Path) -> None:
     """Two workers, and a render resumed from a checkpoint, give the film of one."""
     options: dict[str, Any] = {"paths": "queues", "spp": 8, "size": (64, 48)}

@@ -20,6 +20,7 @@ from clrt.rendering.sensors import SensorOptions
 from clrt.scene.ray_list import REPLICAS
 from clrt.scene.render_settings import Sampler
 
+from ..covering import others
 from ..oracle.scenes import todays_seed
 
 Doubles = NDArray[np.float64]
@@ -138,7 +139,7 @@ def is_matte(mesh: clrt.Mesh) -> bool:
     return isinstance(material, clrt.Diffuse) and isinstance(material.color, tuple) and material.emission == (0, 0, 0)
 
 
-@pytest.mark.parametrize("name", ["cornell", "spot", "night"])
+@pytest.mark.parametrize("name", ["cornell", *others("spot", "night")])
 def test_lambertian_surfaces_reflect_their_irradiance(device: Device, name: str) -> None:
     """L = ρ E / π at the points of matte surfaces that rays from the camera hit."""
     scene = clrt.load(SCENES / f"{name}.toml")

@@ -19,6 +19,7 @@ from clrt.scene.materials.material_types import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Backdrop, Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.render_settings import Integrator
 
+from ..covering import others
 from .pictures import Doubles, film
 
 BLACK = (0.0, 0.0, 0.0)
@@ -125,7 +126,7 @@ def test_the_environment_lights_what_it_does_not_show(device: Device) -> None:
 
 
 @pytest.mark.parametrize("thin", [False, True])
-@pytest.mark.parametrize("integrator", ["path", "local"])
+@pytest.mark.parametrize("integrator", ["path", *others("local")])
 def test_glass_lets_the_background_through(device: Device, thin: bool, integrator: str) -> None:
     """Whichever way a constant environment is refracted: over its color, glass is what it is in it."""
     glass = Sphere(radius=0.7, material=Dielectric(thin=thin, color=(0.6, 0.6, 0.6)))
@@ -140,7 +141,7 @@ def test_glass_lets_the_background_through(device: Device, thin: bool, integrato
     assert solid[SIZE[1] // 2, SIZE[0] // 2] == 1
 
 
-@pytest.mark.parametrize("integrator", ["local", "raster", "normals", "albedo"])
+@pytest.mark.parametrize("integrator", ["raster", "normals", *others("local", "albedo")])
 def test_all_integrators_have_the_same_coverage(device: Device, integrator: Integrator) -> None:
     scene = replace(shapes(), environment=Environment(color=SKY), camera=Camera(position=(0.0, 1.0, 5.0)))
     path = film(device, scene, 16, sampler="sobol")
@@ -164,7 +165,7 @@ def test_a_hidden_lamp_still_lights(device: Device) -> None:
     np.testing.assert_allclose(film(device, replace(scene, spheres=[hidden], render=depth), 1).mean, 5, rtol=1e-6)
 
 
-@pytest.mark.parametrize("integrator", ["path", "local"])
+@pytest.mark.parametrize("integrator", ["path", *others("local")])
 def test_a_hidden_sun_still_lights(device: Device, integrator: Integrator) -> None:
     """Its disc is not behind the scene, but in a mirror, and a ball is as bright as before; another sun is visible."""
     corners = np.array([(-9, -0.5, -90), (-9, -0.5, 9), (9, -0.5, 9), (9, -0.5, -90)], np.float32)
@@ -192,6 +193,7 @@ def test_a_hidden_sun_still_lights(device: Device, integrator: Integrator) -> No
     np.testing.assert_allclose(unseen[~disc], seen[~disc], atol=1e-5)
 
 
+@pytest.mark.combinations
 def test_coverage_in_checkpoints_and_on_several_devices(device: Device, tmp_path: Path) -> None:
     """Two workers, and a render resumed from a checkpoint, give the film of one, to the last bit."""
     scene = replace(shapes(), environment=Environment(color=SKY))

@@ -118,7 +118,7 @@ VALUES: SearchStrategy[Any] = (
 
 @pytest.mark.filterwarnings("ignore:overflow encountered in cast", "ignore:invalid value encountered in cast")
 @pytest.mark.parametrize(("kind", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None, derandomize=True)
 @given(data=st.data())
 def test_what_can_be_made_can_be_rendered(kind: type, name: str, data: DataObject) -> None:
     """Any value of any field is refused with one of clrt's errors when the object is made, or when it becomes part of
