@@ -78,7 +78,7 @@ def test_motion_is_the_transform_at_the_end(tmp_path: Path) -> None:
         np.testing.assert_allclose(each.to_world_end, [[2, 0, 0, 1 + shift], [0, 2, 0, 0], [0, 0, 2, 0]])  # type: ignore[arg-type]
 
 
-def test_saved_scenes_move_alike(tmp_path: Path) -> None:
+def test_saved_scenes_move_alike(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """From their tables, and from instances made in Python, with the pivot."""
     scene = loaded(tmp_path)
     matrix = (translation((1, 0, 2)) @ rotation((10, 20, 30)))[:3]
@@ -91,6 +91,10 @@ def test_saved_scenes_move_alike(tmp_path: Path) -> None:
     assert len(again.instances) == len(scene.instances)
     for each, other in zip(again.instances, scene.instances):
         np.testing.assert_allclose(motion_of([each]).at(0.4), motion_of([other]).at(0.4), atol=1e-12)
+    assert not caplog.messages
+    scene.instances[-1].pivot = np.diag([1.0, 6.0, 1.0, 1.0])
+    save_scene(scene, tmp_path / "saved" / "other.toml")
+    assert 'instance "made": turns about the axes of its mesh in the saved scene' in caplog.text
     faster = loaded(tmp_path, SCENE.replace("90]", "80]"))
     assert scene_hash(loaded(tmp_path)) != scene_hash(faster)
 

@@ -117,6 +117,8 @@ MISTAKES: dict[str, tuple[Callable[[Scene], object], str]] = {
     "light nan": (light((0, NAN, 0)), "DirectionalLight.direction[1]: nan is not a finite number"),
     "light text": (light("up"), 'DirectionalLight.direction: "up" is not a list; write the numbers'),
     "light short": (light((0,)), "DirectionalLight.direction: [0] has 1 entries; write 3"),
+    "named material": (set_scene(materials={"a": 5}), 'materials["a"]: 5 is not of type Material'),
+    "named camera": (set_scene(cameras={"a": 5}), 'cameras["a"]: 5 is not of type Camera; write a clrt.Camera'),
     "no light": (
         set_scene(lights=[Sphere()]),
         "is not of type Light; write a clrt.PointLight or clrt.SpotLight or",

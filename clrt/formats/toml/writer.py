@@ -6,6 +6,7 @@ mesh or an environment map made in Python, or an image inside a model with a cha
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -398,7 +399,14 @@ def _pivot_key(instance: Instance) -> dict[str, tuple[float, ...]]:
     """Return the key of a moving instance's pivot, unless that is the mesh's origin."""
     if instance.pivot is None:
         return {}
-    point = np.linalg.solve(instance.pivot[:, :3], -instance.pivot[:, 3])
+    axes = instance.pivot[:, :3]
+    if not np.allclose(axes, np.eye(3)):
+        logging.getLogger(__name__).warning(
+            "%s: turns about the axes of its mesh in the saved scene, not those of its pivot; between the start and "
+            "the end of the exposure it may be elsewhere",
+            instance.title,
+        )
+    point = np.linalg.solve(axes, -instance.pivot[:, 3])
     return {"pivot": tuple(point.tolist())} if point.any() else {}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp
+from math import exp, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,11 +119,16 @@ class NoiseEstimate:
             return LEAST_FALL
         if level < 2:
             return FIRST_FALL
-        fallen = np.sum(changes_then) / np.sum(changes) * (np.sum(variance) / max(np.sum(variance_then), TINY))
-        faster = float(np.log(np.clip(fallen ** (1 / steps), 1, MOST_FALL / LEAST_FALL)))
+        fallen = _log_ratio(changes_then, changes) + _log_ratio(variance, variance_then)
+        faster = min(max(fallen / steps, 0.0), log(MOST_FALL / LEAST_FALL))
         by_chance = _squared_error_of_log_ratio(changes_then, changes) / steps**2
         lasting = LASTING * (1 - by_chance / faster**2) if faster**2 > by_chance else 0.0
         return LEAST_FALL * exp(lasting * faster)
+
+
+def _log_ratio(above: NDArray[np.float64], below: NDArray[np.float64]) -> float:
+    """Return log(Σ above / Σ below), where either may be 0 or tiny."""
+    return log(max(float(np.sum(above)), TINY)) - log(max(float(np.sum(below)), TINY))
 
 
 def _squared_error_of_log_ratio(above: NDArray[np.float64], below: NDArray[np.float64]) -> float:

@@ -34,6 +34,8 @@ PARTS: dict[str, type[Validated]] = {
 }
 #: Parts that a scene may lack.
 OPTIONAL: dict[str, type[Validated]] = {"backdrop": Backdrop, "ground": Ground}
+#: Parts by their names in the scene, likewise.
+NAMED: dict[str, type[Validated]] = {"cameras": Camera, "materials": Material}
 #: Concrete types of the abstract ones.
 KINDS: dict[type, tuple[type, ...]] = {Material: MATERIALS, BaseLight: LIGHTS}
 
@@ -60,6 +62,9 @@ def scene_problems(scene: Scene) -> list[str]:
     problems = [problem for name, kind in PARTS.items() for problem in _problems(getattr(scene, name), kind, name)]
     for name, kind in OPTIONAL.items():
         problems += [] if getattr(scene, name) is None else _problems(getattr(scene, name), kind, name)
+    for name, kind in NAMED.items():
+        for key, part in getattr(scene, name).items():
+            problems += _problems(part, kind, f"{name}[{show(key)}]")
     for field, (name, kind) in LISTS.items():
         for i, part in enumerate(getattr(scene, field)):
             problems += _problems(part, kind, f"{name}[{i}]")
@@ -76,7 +81,7 @@ def _list_problems(scene: Scene) -> list[str]:
         if not isinstance(part := getattr(scene, name), (list, tuple))
     ] + [
         f"{name}: {show(part)} is not a dict; write {name}={{...}}, by their names"
-        for name in ("cameras", "materials")
+        for name in NAMED
         if not isinstance(part := getattr(scene, name), dict)
     ]
 
