@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .aov_types import LIGHT_GROUPS, OF_GROUP, aovs_from
 from .device.open import Selectors
-from .errors import SceneError, UsageError, did_you_mean
+from .errors import SceneError, UsageError, check_choice
 from .float_errors import with_default_errors
 from .rendering.aovs import AOVS
 from .rendering.listed_keywords import listed
@@ -149,10 +149,10 @@ def render_views(
 
 def _chosen(layers: str | Iterable[str]) -> tuple[str, ...]:
     """Return the names without duplicates. Raises UsageError for names not in LAYERS."""
-    names = tuple(dict.fromkeys(layers.split(",") if isinstance(layers, str) else layers))
-    for name in names:
-        if name not in LAYERS:
-            raise UsageError(f"layer {name!r} is unknown; choose from {', '.join(LAYERS)}{did_you_mean(name, LAYERS)}")
+    listed = layers.split(",") if isinstance(layers, str) else [*layers]
+    for name in listed:
+        check_choice("layer", name, LAYERS)
+    names = tuple(dict.fromkeys(listed))
     if not names:
         raise UsageError(f"there are no layers; choose from {', '.join(LAYERS)}")
     return names

@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +56,42 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "load": (clrt.load, {"path": SCENES / "models" / "spot.obj"}),
 }
+BALL = clrt.Scene(spheres=[clrt.Sphere()], render=clrt.RenderSettings(size=(4, 4), spp=1))
+TURNED = clrt.turntable(BALL, frames=2)
+Mesh: Any = clrt.Mesh  # of lists, which its types do not have
+TRIANGLE = clrt.Scene(meshes=[Mesh(np.eye(3), [[0, 1, 2]], uv=[[0, 0], [1, 0], [0, 1]])], render=BALL.render)
+POINTS = {"points": [[0, 3, 0]], "normals": [[0, 1, 0]]}
+PICTURE = clrt.Image(np.ones((4, 4, 3), np.float32), aovs={"light_group.lamp": np.ones((4, 4, 3), np.float32)})
+#: All public functions but `load`, and methods of objects, with the arguments that they need.
+FUNCTIONS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
+    "render": (clrt.render, {"scene": BALL}),
+    "animate": (clrt.animate, {"scene": TURNED, "frames": [0]}),
+    "frames": (clrt.frames, {"scene": TURNED}),
+    "turntable": (clrt.turntable, {"scene": BALL, "frames": 2}),
+    "stereo_pair": (clrt.stereo_pair, {"camera": BALL.camera, "baseline": 1, "converge_at": 3.0}),
+    "each_view": (clrt.each_view, {"scene": BALL, "cameras": [BALL.camera], "layers": "normal"}),
+    "render_views": (clrt.render_views, {"scene": BALL, "cameras": [BALL.camera], "layers": "normal"}),
+    "save_views": (
+        clrt.save_views,
+        {"folder": "views", "scene": BALL, "views": [*clrt.each_view(BALL, [BALL.camera])], "formats": "nerf"},
+    ),
+    "radiance": (clrt.radiance, {"scene": BALL, "origins": [0, 0, 5], "directions": [0, 0, -1]}),
+    "irradiance": (clrt.irradiance, {"scene": BALL, **POINTS}),
+    "ambient_occlusion": (clrt.ambient_occlusion, {"scene": BALL, **POINTS}),
+    "bake": (clrt.bake, {"scene": TRIANGLE, "mesh": "mesh", "size": 4}),
+    "relight": (clrt.relight, {"image": PICTURE, "factors": {}}),
+    "denoise": (clrt.denoise, {"image": PICTURE}),
+    "compare": (clrt.compare, {"image": PICTURE, "reference": PICTURE}),
+    "read_image": (clrt.read_image, {"path": "image.png"}),
+    "save_scene": (clrt.save_scene, {"scene": BALL, "path": "scene.toml"}),
+    "Image.save": (PICTURE.save, {"path": "image.png"}),
+    "Camera.from_matrix": (
+        clrt.Camera.from_matrix,
+        {"K": [[9, 0, 2], [0, 9, 2], [0, 0, 1]], "size": (4, 4), "world_to_camera": np.eye(4)},
+    ),
+    "Camera.project": (BALL.camera.project, {"points": [[0, 0, 0]], "size": (4, 4)}),
+    "Camera.matrix": (BALL.camera.matrix, {"size": (4, 4)}),
+}
 #: Arguments that are files or callbacks, not values to choose from.
 OTHER = {"on_phase", "before", "checkpoint", "resume"}
 
@@ -68,6 +104,29 @@ def test_any_value_of_an_argument(device: Device, name: str) -> None:
     for argument in inspect.signature(call).parameters.keys() - OTHER:
         for value in WRONG:
             asked(call, good, argument, value)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_any_value_of_an_argument_of_a_function(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Likewise of arguments with a type of their own; those of a list of options are the renderer's."""
+    monkeypatch.chdir(tmp_path)
+    call, good = FUNCTIONS[name]
+    consume(call(**good)) if name != "read_image" else PICTURE.save("image.png")
+    for argument, parameter in inspect.signature(inspect.unwrap(call)).parameters.items():
+        if argument not in ("self", "cls") and parameter.kind is not inspect.Parameter.VAR_KEYWORD:
+            for value in (*WRONG, BALL.camera, clrt.Camera, BALL, [BALL.camera], "lamp=2"):
+                if argument != "time" or not _is_time(value):
+                    asked(call, good, argument, value)
+
+
+def _is_time(value: object) -> bool:
+    """Return whether a render would take so many seconds."""
+    return isinstance(value, int | float | np.float32) and bool(value > 0)
+
+
+def test_all_functions_are_asked() -> None:
+    public = {name for name in clrt.__all__ if inspect.isfunction(getattr(clrt, name))}
+    assert public == {name for name in (*FUNCTIONS, "load", "devices") if name[0].islower()}
 
 
 def test_any_value_of_a_method(device: Device) -> None:
@@ -90,9 +149,15 @@ def test_a_sequence_of_calls() -> None:
     assert not fault, fault
 
 
+def consume(result: object) -> None:
+    if isinstance(result, Iterator):
+        for _ in result:
+            pass
+
+
 def asked(call: Callable[..., Any], good: dict[str, Any], argument: str, value: Any) -> None:
     try:
-        call(**good | {argument: value})
+        consume(call(**good | {argument: value}))
     except ClrtError:
         pass
     except Exception as error:

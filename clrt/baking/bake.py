@@ -18,11 +18,11 @@ from ..rendering.compile.choices import Choices
 from ..rendering.light_meter import LightMeter, LightPart
 from ..rendering.listed_keywords import listed
 from ..rendering.sensors import SensorOptions, reach_of
-from ..scene.fields.field_types import show
+from ..scene.fields.field_types import field_problems, show
 from ..scene.model import Instance, Mesh, Scene
 from ..scene.ray_list import REPLICAS, RayList
 from ..scene.render_settings import RenderSettings
-from ..scene.validation.validate import check_is_scene, validate
+from ..scene.validation.validate import validate
 from .light_map import LightMap
 from .padding import padded
 from .texel_points import PLACES, TexelPoints, other_set
@@ -63,13 +63,12 @@ class BakeOptions:
 
     def check(self) -> None:
         """Raise UsageError for values that cannot be used."""
-        if self.what not in _PARTS:
-            known = ", ".join(_PARTS)
-            raise UsageError(f"what is {self.what!r}; choose from {known}{did_you_mean(str(self.what), list(_PARTS))}")
+        if problems := field_problems(BakeOptions, vars(self), "bake"):
+            raise UsageError("\n".join(problems))
         if not all(1 <= length <= MOST_TEXELS for length in self.width_and_height):
             raise UsageError(f"size is {self.size}; give 1 to {MOST_TEXELS} texels, or (width, height)")
-        if self.padding < 0:
-            raise UsageError(f"padding is {self.padding}; give 0 or more texels")
+        if not 0 <= self.padding <= MOST_TEXELS:
+            raise UsageError(f"padding is {self.padding}; give 0 to {MOST_TEXELS} texels")
         if self.uv_set not in (0, 1):
             raise UsageError(f"uv_set is {self.uv_set}; give 0 or 1")
         if self.noise is not None and not 0 < self.noise < np.inf:
@@ -95,7 +94,6 @@ class Bake:
     """A bake in progress. Raises the exceptions of `bake`."""
 
     def __init__(self, scene: Scene, mesh: str | Mesh | Instance, how: BakeOptions, options: Mapping[str, Any]) -> None:
-        check_is_scene(scene)
         how.check()
         validate(scene)
         self._how = how

@@ -14,7 +14,9 @@ from ..aov_types import OF_GROUP
 from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from ..scene.fields.field_types import show
-from ..scene.fields.validated import Validated, read_only
+from ..scene.fields.keywords import with_known_keywords
+from ..scene.fields.number_arrays import read_only
+from ..scene.fields.validated import Validated
 from .data_images import shown_data
 from .file_formats import is_shown
 from .images import write_image
@@ -74,6 +76,7 @@ class Image(Validated):
             if name.startswith(OF_GROUP)
         }
 
+    @with_known_keywords
     @with_default_errors
     def save(self, path: StrPath, *, view: str | None = None, exposure: float = 0.0) -> Path:
         """Write .exr or .hdr (linear), or .png, .jpg, .webp, .tif (through `view`, after multiplication by 2^exposure).

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import OutputError, did_you_mean
 from ..file_names import StrPath, utf8_path
 from ..formats.images.image_reader import read_picture
+from ..scene.fields.keywords import with_known_keywords
 from .aov_files import Pictures, drawn, files_beside, layered
 from .atomic_files import check_target, replacing
 from .file_formats import DESCRIPTION, FORMATS, EncodedFormat, described, format_of
@@ -29,8 +30,16 @@ RGBE_MAX = 255 / 256 * 2.0**127
 UNASSOCIATED = "oiio:UnassociatedAlpha"
 _log = logging.getLogger(__name__)
 
-#: Reads images that were written, or any others.
-read_image = read_picture
+
+@with_known_keywords
+def read_image(path: StrPath) -> FloatArray:
+    """Return an image's pixels: (h, w, 3) float32, linear, row 0 on top, NaN and Inf kept.
+
+    Float files (.exr, .hdr) are used unchanged; integer ones (.png, .jpg and others) are decoded from sRGB. One channel
+    is grey; alpha is dropped; of several layers the one that has the image is read. Raises SceneError naming the file
+    if it is missing, empty, damaged, or has no color channels.
+    """
+    return read_picture(path)
 
 
 def metadata_of(path: Path, name: str) -> str | None:

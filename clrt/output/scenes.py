@@ -21,7 +21,7 @@ def save_scene(scene: Scene, path: StrPath, *, force: bool = True) -> list[Path]
     """
     path = Path(path)
     if path.suffix.lower() != ".toml":
-        raise OutputError(f"{path}: a scene file's name must end in .toml; write {path.with_suffix('.toml')}")
+        raise OutputError(f"{path}: a scene file's name must end in .toml; write {path.parent / path.stem}.toml")
     check_target(path)
     files = scene_files(scene, path)
     try:

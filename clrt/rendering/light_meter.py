@@ -15,7 +15,7 @@ from ..scene.on_ground import on_plain_ground
 from ..scene.ray_list import REPLICAS, RayList
 from .film.film import Film
 from .renderer import Renderer
-from .renderer_options import RendererOptions
+from .renderer_options import RendererOptions, settings_of
 
 Doubles = NDArray[np.float64]
 #: Which light is measured: all, or that of paths of at most or more than two segments.
@@ -34,12 +34,11 @@ class LightMeter:
 
     def __init__(self, scene: Scene, options: Mapping[str, Any], part: LightPart = "all") -> None:
         self._scene, self._part = _without_compositing(scene), part
-        self._options = cast(RendererOptions, dict(options))
+        left = {name: value for name, value in options.items() if name not in ("spp", "seed")}
+        self._options = cast(RendererOptions, left)
         # Without a planned number of samples each pixel has a sequence of its own, so that replicas are independent.
-        spp = self._options.pop("spp", None)
-        self.spp: int = scene.render.spp if spp is None else spp
-        seed = self._options.pop("seed", None)
-        self._seed: int = scene.render.seed if seed is None else seed
+        planned = settings_of(scene.render, {"spp": options.get("spp"), "seed": options.get("seed")})
+        self.spp, self._seed = planned.spp, planned.seed
         if part != "all":
             self._options["aovs"] = ["direct"]
         self._renderer: Renderer | None = None

@@ -12,7 +12,7 @@ from textwrap import fill
 from types import NoneType
 from typing import Annotated, Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
 
-from ..scene.fields.keywords import check_keywords
+from ..scene.fields.keywords import check_arguments
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -57,7 +57,8 @@ def _checked(
     call: Callable[..., Any], name: str, hints: Mapping[str, Any], described: Mapping[str, Field[Any]]
 ) -> Callable[..., Any]:
     """Return the call that refuses unknown keywords, with its full signature."""
-    own = [each for each in signature(call).parameters.values() if each.kind is not Parameter.VAR_KEYWORD]
+    form = signature(call)
+    own = [each for each in form.parameters.values() if each.kind is not Parameter.VAR_KEYWORD]
     known = {each.name for each in own} | {*hints}
     keywords = [
         Parameter(each, Parameter.KEYWORD_ONLY, default=_default(each, hint, described), annotation=_type(hint))
@@ -66,10 +67,10 @@ def _checked(
 
     @wraps(call)
     def checked(*arguments: Any, **given: Any) -> Any:
-        check_keywords(name, given, known)
+        check_arguments(name, call, form, arguments, given, known)
         return call(*arguments, **given)
 
-    setattr(checked, "__signature__", signature(call).replace(parameters=[*own, *keywords]))
+    setattr(checked, "__signature__", form.replace(parameters=[*own, *keywords]))
     return checked
 
 

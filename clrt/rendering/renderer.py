@@ -15,9 +15,10 @@ from ..device.open import Selectors, name_of, open_devices
 from ..errors import DeviceError
 from ..float_errors import with_default_errors
 from ..scene.exposure import motion_features
+from ..scene.fields.keywords import with_known_keywords
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.on_ground import is_below, on_ground
-from ..scene.validation.validate import check_is_scene, validate
+from ..scene.validation.validate import validate
 from .accumulation.accumulation import Accumulation
 from .accumulation.launch_plan import LaunchPlan
 from .accumulation.multi_device import make_picture
@@ -51,7 +52,6 @@ class Renderer:
 
     @with_default_errors
     def __init__(self, scene: Scene, **options: Unpack[RendererOptions]) -> None:
-        check_is_scene(scene)
         check_stops(options.get("spp"))
         percentile = checked_percentile(options.get("error_percentile"))
         self.given: Scene = replace(scene, render=settings_of(scene.render, options))
@@ -133,6 +133,7 @@ class Renderer:
         """The scene's render settings, overridden by the options given."""
         return self.scene.render
 
+    @with_known_keywords
     def look(self, camera: Camera) -> None:
         """Start a new image from this camera, bit-identical to the one that a new renderer would produce.
 
@@ -150,6 +151,7 @@ class Renderer:
             self._asked_for = camera
             self._see()
 
+    @with_known_keywords
     def show(self, scene: Scene) -> None:
         """Start a new image of another scene with the same settings, like `look` if only the camera differs.
 
@@ -158,7 +160,6 @@ class Renderer:
         UsageError as `look` does.
         """
         check_of_none(self._checkpoints)
-        check_is_scene(scene)
         if same_world(scene, self.given) and self._stays(scene):
             self.look(scene.camera)
             return
@@ -198,6 +199,7 @@ class Renderer:
         else:
             self._progress.session = self._new_picture()
 
+    @with_known_keywords
     def passes(
         self,
         *,

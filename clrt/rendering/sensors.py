@@ -15,7 +15,6 @@ from ..scene.geometry.ray_arrays import ray_arrays
 from ..scene.model import Scene
 from ..scene.ray_list import RayList
 from ..scene.render_settings import RenderSettings, Sampler
-from ..scene.validation.validate import check_is_scene
 from .compile.choices import Choices
 from .light_meter import LightMeter, Measurement
 from .listed_keywords import listed
@@ -41,7 +40,7 @@ def radiance(scene: Scene, origins: ArrayLike, directions: ArrayLike, **options:
     there would see. Standard errors are those of 16 independent estimates, so 99.1 % of the errors are below three of
     them (Student's t, 15 degrees of freedom). Raises UsageError for other arrays, and what `render` raises.
     """
-    starts, ways = _rays(origins, directions, "directions")
+    starts, ways = _rays(origins, directions, ("origins", "directions"))
     return _measured(scene, RayList(origins=starts, directions=ways), options)
 
 
@@ -55,7 +54,7 @@ def irradiance(scene: Scene, points: ArrayLike, normals: ArrayLike, **options: U
     surface at the point itself casts no shadow. In the scene's unit of radiance, times sr. Standard errors and
     exceptions: as in `radiance`.
     """
-    places, ways = _rays(points, normals, "normals")
+    places, ways = _rays(points, normals, ("points", "normals"))
     rays = RayList(origins=places, directions=ways, surface_normals=ways, measures="irradiance")
     value, error = _measured(scene, rays, options)
     return Measurement(np.pi * value, np.pi * error)
@@ -76,7 +75,7 @@ def ambient_occlusion(
     `distance` (None: at any distance). Values and standard errors are (n,). Points, normals, standard errors and
     exceptions: as in `irradiance`; UsageError also for a distance that is not above 0.
     """
-    places, ways = _rays(points, normals, "normals")
+    places, ways = _rays(points, normals, ("points", "normals"))
     rays = RayList(
         origins=places,
         directions=ways,
@@ -95,22 +94,23 @@ def reach_of(distance: float | None) -> float:
     return distance or 0.0
 
 
-def _rays(origins: ArrayLike, directions: ArrayLike, name: str) -> tuple[NDArray[np.floating], NDArray[np.float32]]:
-    """Return origins, and unit directions."""
-    starts, ways, _ = ray_arrays(origins, directions, np.inf)
+def _rays(
+    origins: ArrayLike, directions: ArrayLike, names: tuple[str, str]
+) -> tuple[NDArray[np.floating], NDArray[np.float32]]:
+    """Return origins, and unit directions; names: what the caller calls them."""
+    starts, ways, _ = ray_arrays(origins, directions, np.inf, names)
     finite = np.isfinite(starts).all(axis=1) & np.isfinite(ways).all(axis=1)
     lengths = np.linalg.norm(ways.astype(np.float64), axis=1)
     if len(bad := np.flatnonzero(~finite | (lengths == 0))):
         row = int(bad[0])
         raise UsageError(
-            f"ray {row}, from {starts[row].tolist()}, {name} {ways[row].tolist()}: give finite numbers, and directions "
-            "that are not 0"
+            f"{names[0]}[{row}] is {starts[row].tolist()}, and {names[1]}[{row}] {ways[row].tolist()}; give finite "
+            f"numbers, and {names[1]} that are not 0"
         )
     return starts, (ways / lengths[:, None]).astype(np.float32)
 
 
 def _measured(scene: Scene, rays: RayList, options: SensorOptions) -> Measurement:
-    check_is_scene(scene)
     measured = Measurement(np.zeros((0, 3)), np.zeros((0, 3)))
     if len(rays.origins):
         for _, measured in LightMeter(scene, options).measure(rays):

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import UsageError
+from ..errors import UsageError, check_choice
 from .fields.number_arrays import real_array
 
 Doubles = NDArray[np.float64]
@@ -50,8 +50,7 @@ def pose_of(
     camera_to_world: ArrayLike | None, world_to_camera: ArrayLike | None, convention: Convention
 ) -> dict[str, tuple[float, ...]]:
     """Return the fields of Camera for a pose; `look_at` is at a distance of 1. Raises UsageError."""
-    if convention not in AXES:
-        raise UsageError(f"convention {convention!r} is unknown; choose from {', '.join(AXES)}")
+    check_choice("convention", convention, AXES)
     if camera_to_world is not None and world_to_camera is None:
         matrix = _rigid("camera_to_world", camera_to_world)
         axes, position = matrix[:, :3], matrix[:, 3]
@@ -88,7 +87,9 @@ def _finite(name: str, matrix: ArrayLike) -> Doubles:
 def _rigid(name: str, pose: ArrayLike) -> Doubles:
     """Return a rigid motion as (3, 4)."""
     matrix = _finite(name, pose)
-    if matrix.shape == (4, 4) and np.array_equal(matrix[3], (0, 0, 0, 1)):
+    if matrix.shape == (4, 4):
+        if not np.array_equal(matrix[3], (0, 0, 0, 1)):
+            raise UsageError(f"{name} has the last row {matrix[3].tolist()}; it must be 0, 0, 0, 1")
         matrix = matrix[:3]
     if matrix.shape != (3, 4):
         raise UsageError(

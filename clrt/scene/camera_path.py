@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import SceneError, UsageError, check_choice
 from .animation import Animation, Keyframe, ModelAnimation, SceneAnimation, Turns
-from .fields.field_types import field_problems, show
+from .fields.field_types import field_problems, show, value_problems
 from .fields.keywords import with_known_keywords
 from .frame_model import frame_turning
 from .geometry.transform import rotation, transform_light, translation
@@ -67,7 +67,9 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
         raise SceneError(problems)
     count = animation.frames
     numbers = range(count) if chosen is None else list(chosen)
-    for number in numbers:
+    for i, number in enumerate(numbers):
+        if problems := value_problems(float, number, f"frames.chosen[{i}]"):
+            raise UsageError("\n".join(problems))
         if not 0 <= number < count:
             raise UsageError(f"{scene.name} has no frame {number}; its frames are 0 to {count - 1}")
     if isinstance(animation, ModelAnimation):

@@ -12,11 +12,13 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import ObjectError, UsageError
+from ..errors import ObjectError, UsageError, check_choice
 from .animation import Positive, Vector
 from .camera_matrices import Convention, coefficients_of, intrinsics_of, pose_of, world_to_camera_of
 from .fields.field_types import show
-from .fields.limits import Gt, Lt
+from .fields.keywords import with_known_keywords
+from .fields.limits import Ge, Gt, Lt
+from .fields.number_arrays import real_array
 from .fields.validated import Validated
 from .lens_model import BROWN_CONRADY, FISHEYE, LensModel
 from .materials.textures import NonNegative
@@ -24,6 +26,8 @@ from .materials.textures import NonNegative
 Doubles = NDArray[np.float64]
 Calibrated = Literal["perspective", "fisheye"]
 Projection = Literal["perspective", "orthographic", "equirectangular", "fisheye"]
+#: Width and height of an image in pixels.
+Size = tuple[Annotated[int, Ge(1)], Annotated[int, Ge(1)]]
 #: Lengths that a camera may have.
 OPTIONAL_LENGTHS = ("focus_distance", "view_height")
 
@@ -87,10 +91,11 @@ class Camera(Validated):
     end: CameraEnd | None = None
 
     @classmethod
+    @with_known_keywords
     def from_matrix(
         cls,
         K: ArrayLike,
-        size: tuple[int, int],
+        size: Size,
         *,
         camera_to_world: ArrayLike | None = None,
         world_to_camera: ArrayLike | None = None,
@@ -109,12 +114,14 @@ class Camera(Validated):
         others of Camera. Raises UsageError for arrays that are not of these forms. (Hartley and Zisserman, "Multiple
         View Geometry", 2nd ed., 6.1.)
         """
+        check_choice("projection", projection, CALIBRATED)
         known: dict[str, Any] = pose_of(camera_to_world, world_to_camera, convention)
         known |= intrinsics_of(K, size, first_pixel, projection == "fisheye")
         known |= {"projection": projection, "distortion": coefficients_of(distortion, CALIBRATED[projection])}
         return cls(**{**known, **fields})
 
-    def matrix(self, size: tuple[int, int], first_pixel: float = 0.5) -> Doubles:
+    @with_known_keywords
+    def matrix(self, size: Size, first_pixel: float = 0.5) -> Doubles:
         """Return the intrinsic matrix K, (3, 3), for images of `size` (width, height) in pixels; see `from_matrix`."""
         width, height = size
         half = np.radians(self.fisheye_degrees if self.projection == "fisheye" else self.fov_degrees) / 2
@@ -132,7 +139,8 @@ class Camera(Validated):
             else LensModel.brown_conrady(self.distortion)
         )
 
-    def project(self, points: ArrayLike, size: tuple[int, int], first_pixel: float = 0.5) -> Doubles:
+    @with_known_keywords
+    def project(self, points: ArrayLike, size: Size, first_pixel: float = 0.5) -> Doubles:
         """Return the pixels (…, 2) that points (…, 3) of the world lie at, as `cv2.projectPoints` does.
 
         They are NaN for points that the camera has no image of. size, first_pixel: see `from_matrix`. Raises UsageError
@@ -141,7 +149,7 @@ class Camera(Validated):
         if self.projection not in CALIBRATED:
             raise UsageError(f"a camera with the projection {self.projection!r} has no matrix to project points by")
         pose, K = self.world_to_camera, self.matrix(size, first_pixel)
-        on_plane = self.lens.distorted(np.asarray(points, np.float64) @ pose[:3, :3].T + pose[:3, 3])
+        on_plane = self.lens.distorted(_points(points) @ pose[:3, :3].T + pose[:3, 3])
         return np.asarray(on_plane @ K[:2, :2].T + K[:2, 2])
 
     @property
@@ -228,6 +236,13 @@ class Camera(Validated):
         """Return the fields that only other camera types read, and their defaults."""
         others = frozenset().union(*(kind.reads for kind in CAMERA_TYPES.values())) - self.type.reads
         return {field.name: field.default for field in fields(self) if field.name in others}
+
+
+def _points(points: ArrayLike) -> Doubles:
+    found = real_array("points", points).astype(np.float64, copy=False)
+    if found.shape[-1:] != (3,):
+        raise UsageError(f"points has the shape {found.shape}; its last dimension must be 3")
+    return found
 
 
 def _scaled(lens: Camera | CameraEnd, factor: float) -> dict[str, Any]:

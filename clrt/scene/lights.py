@@ -371,7 +371,8 @@ def fields_of(kind: type[Light], values: Mapping[str, Any]) -> dict[str, Any]:
 
 def unit_vector(direction: Vector, sign: float = 1) -> Vector:
     """Return the unit vector along a direction, or against it for a sign of −1."""
-    x, y, z = (sign * np.asarray(direction) / np.linalg.norm(direction)).tolist()
+    along = np.asarray(direction, np.float64)  # numpy has no integers of more than 64 bits
+    x, y, z = (sign * along / np.linalg.norm(along)).tolist()
     return x, y, z
 
 

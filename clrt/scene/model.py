@@ -11,14 +11,13 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ClrtError
+from ..errors import SceneError
 from .animation import Animation, ModelAnimation, SceneAnimation
 from .axes_and_units import Axis, LightUnit, Unit
 from .cameras import Camera as Camera
 from .fields.field_types import show
 from .fields.group_name import GroupName
 from .fields.limits import Ge, Gt, Le
-from .fields.number_arrays import real_array, whole_array
 from .fields.pixels import image_faults
 from .fields.validated import Editable, KnownFields, Validated
 from .geometry.mesh_faults import CORNERS, mesh_faults
@@ -41,8 +40,7 @@ ViewName = Literal["srgb", "agx", "pbr_neutral", "reinhard", "aces", "raw"]
 class Mesh(Editable):
     """Triangle mesh with one material.
 
-    - vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front. Lists and arrays of other
-      dtypes are converted.
+    - vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front.
     - normals: (n, 3) float32, interpolated over each face, or None for flat shading.
     - uv, uv1: (n, 2) float32, the two sets of texture coordinates (see `Texture`).
     - colors: (n, 3) or (n, 4) float32, linear, from 0 to 1; they multiply the material's color, and the fourth
@@ -50,9 +48,9 @@ class Mesh(Editable):
     - tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing.
     - material_name: the material's name in the model file.
 
-    The arrays are read-only views of those that are given, which are not copied unless they are converted: do not
-    change them any more. Raises SceneError for other shapes, indices out of range, values that are not finite, normals
-    of length 0, and textures in the material without texture coordinates.
+    Lists and arrays of other dtypes are converted. The arrays are read-only views of those that are given, which are
+    not copied unless they are converted: do not change them any more. Raises SceneError for other shapes, indices out
+    of range, values that are not finite, normals of length 0, and textures in the material without texture coordinates.
     """
 
     remedy: ClassVar[str] = "write a clrt.Mesh"
@@ -66,16 +64,6 @@ class Mesh(Editable):
     colors: FloatArray | None = None
     tangents: FloatArray | None = None
     material_name: str = ""
-
-    def __post_init__(self) -> None:
-        """Convert lists and other dtypes to float32 and int32 if the values fit."""
-        with suppress(ClrtError), np.errstate(over="ignore", under="ignore"):
-            self.vertices = real_array("vertices", self.vertices).astype(np.float32, copy=False)
-        with suppress(ClrtError):
-            faces = whole_array("faces", self.faces)
-            narrow = faces.astype(np.int32, copy=False)
-            self.faces = narrow if narrow is faces or np.array_equal(faces, narrow) else faces
-        super().__post_init__()
 
     @property
     def title(self) -> str:
@@ -324,6 +312,7 @@ class Scene(KnownFields):
     changed; a scene is validated again before it is rendered.
     """
 
+    remedy: ClassVar[str] = 'write a clrt.Scene, or clrt.load("FILE")'
     meshes: list[Mesh] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
     spheres: list[Sphere] = field(default_factory=list)
@@ -349,10 +338,18 @@ class Scene(KnownFields):
 
     def _convert(self) -> None:
         """Replace other libraries' meshes and scenes by what they show."""
-        models = [next(filter(None, (convert(each) for convert in CONVERSIONS)), None) for each in self.meshes]
+        models = [_converted(each, f"meshes[{i}]") for i, each in enumerate(self.meshes)]
         self.meshes = [
             mesh
             for each, model in zip(self.meshes, models)
             for mesh in ([each] if model is None else [*model.meshes, *model.emitters])
         ]
         self.instances = [*self.instances, *(each for model in models if model for each in model.instances)]
+
+
+def _converted(mesh: object, where: str) -> Model | None:
+    """Return the content of another library's mesh or scene, if it is one. Raises SceneError, which names its place."""
+    try:
+        return next(filter(None, (convert(mesh) for convert in CONVERSIONS)), None)
+    except SceneError as error:
+        raise SceneError([f"{where}: {problem}" for problem in error.problems]) from error

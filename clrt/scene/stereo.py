@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import UsageError
-from .cameras import Camera
+from .cameras import Camera, Size
 from .fields.keywords import with_known_keywords
 
 
 @with_known_keywords
 def stereo_pair(
-    camera: Camera, baseline: float, *, converge_at: float | None = None, size: tuple[int, int] = (1, 1)
+    camera: Camera, baseline: float, *, converge_at: float | None = None, size: Size = (1, 1)
 ) -> tuple[Camera, Camera]:
     """Return the left and the right camera, half a `baseline` to either side of `camera`, with parallel views.
 

@@ -81,8 +81,8 @@ def test_a_scene_is_made_of_meshes_and_scenes() -> None:
         assert one.material == other.material
     with pytest.raises(SceneError, match=r"meshes: <trimesh.* is not a list; write meshes=\[...\]"):
         clrt.Scene(meshes=trimesh.creation.box())
-    with pytest.raises(SceneError, match="^Trimesh of trimesh: its scene contains no triangles"):
-        clrt.Scene(meshes=[trimesh.Trimesh()])  # type: ignore[list-item]
+    with pytest.raises(SceneError, match=r"^meshes\[1\]: Trimesh of trimesh: its scene contains no triangles"):
+        clrt.Scene(meshes=[trimesh.creation.box(), trimesh.Trimesh()])  # type: ignore[list-item]
 
 
 def test_rays_meet_all_meshes_of_a_scene() -> None:

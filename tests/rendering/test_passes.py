@@ -206,9 +206,9 @@ def test_unknown_choices_are_refused(device: Device, chosen: dict[str, object]) 
 @pytest.mark.parametrize(
     ("scene", "words"),
     [
-        ("scenes/cornell.toml", "scene is the path 'scenes/cornell.toml'; read it with clrt.load"),
-        (Path("a.glb"), "scene is the path 'a.glb'; read it with clrt.load"),
-        (Camera(), "scene is a Camera; give a clrt.Scene"),
+        ("scenes/cornell.toml", '"scenes/cornell.toml" is not of type Scene; write a clrt.Scene, or clrt.load'),
+        (Path("a.glb"), "a.glb.* is not of type Scene; write a clrt.Scene, or clrt.load"),
+        (Camera(), "Camera.* is not of type Scene; write a clrt.Scene"),
     ],
     ids=str,
 )

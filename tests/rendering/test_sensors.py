@@ -272,7 +272,7 @@ def test_moving_lights_are_measured_over_the_exposure(device: Device) -> None:
 def test_arrays_that_are_no_rays(device: Device) -> None:
     scene = clrt.Scene(environment=BLACK)
     assert clrt.radiance(scene, np.zeros((0, 3)), np.zeros((0, 3))).value.shape == (0, 3)
-    with pytest.raises(UsageError, match=r"ray 1, from \[0\.0, 0\.0, 0\.0\], normals \[0\.0, 0\.0, 0\.0\]"):
+    with pytest.raises(UsageError, match=r"points\[1\] is \[0\.0, 0\.0, 0\.0\], and normals\[1\] \[0\.0, 0\.0, 0\.0\]"):
         clrt.irradiance(scene, np.zeros((2, 3)), np.array([[0, 1.0, 0], [0, 0, 0]]))
     with pytest.raises(UsageError, match="origins"):
         clrt.radiance(scene, np.zeros((2, 2)), (0, 0, 1))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import MISSING, fields, replace
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,11 @@ import clrt
 from clrt.errors import ClrtError, ObjectError, SceneError
 from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.compile_scene import compile_scene
-from clrt.scene.fields.field_types import field_problems
+from clrt.scene.fields.field_types import array_fields, field_problems
 from clrt.scene.fields.validated import Editable
 from clrt.scene.lights import LIGHTS
 from clrt.scene.materials.material_types import MATERIALS
-from clrt.scene.model import Scene
+from clrt.scene.model import MATRICES, Scene
 
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 FACES = np.array([[0, 1, 2]], np.int32)
@@ -222,6 +223,62 @@ def test_fields_that_do_not_exist_cannot_be_assigned(kind: type) -> None:
         setattr(made, name, getattr(made, name))
         with pytest.raises(ObjectError, match=f'the field "{name}_" is unknown; did you mean "{name}"'):
             setattr(made, f"{name}_", 3)
+
+
+ARRAY_FIELDS = [(kind, name) for kind in MADE for name in array_fields(kind)]
+
+
+@pytest.mark.parametrize(("kind", "name"), ARRAY_FIELDS, ids=lambda part: getattr(part, "__name__", part))
+def test_arrays_may_be_lists_or_of_other_dtypes(kind: type, name: str) -> None:
+    """They are converted, also when they are assigned later, if their numbers fit; pictures' integers are not light."""
+    make, form = MADE[kind][0], {"tangents": (3, 4), "image": (2, 4, 3), "to_world_end": (3, 4), "pivot": (3, 4)}
+    own = getattr(make(), name)
+    array = np.eye(4)[:3] if name in MATRICES else np.ones(form.get(name, (3, 3))) if own is None else own
+    wide = array.astype(np.float64 if array.dtype.kind == "f" else np.int64)
+    for values in (array, array.tolist(), wide, tuple(map(tuple, array.tolist()))):
+        made = make(**{name: values})
+        stored = getattr(made, name)
+        assert stored.dtype == array_fields(kind)[name] and not stored.flags.writeable
+        np.testing.assert_array_equal(stored, array)
+        if isinstance(made, Editable):
+            setattr(made, name, values)
+            assert getattr(made, name).dtype == array_fields(kind)[name]
+    if array.dtype.kind != "f":
+        with pytest.raises(SceneError, match=f"{name}.*float64"):
+            make(**{name: array + 0.5})
+    elif array.ndim == 3:
+        with pytest.raises(SceneError, match=f"{name}: is uint8"):
+            make(**{name: array.astype(np.uint8)})
+
+
+def test_fields_without_names_or_missing() -> None:
+    """As many fields as have places may be given without their names, and all without a default must be given."""
+    for kind in MADE:
+        places = [field.name for field in fields(kind) if not field.kw_only]
+        with pytest.raises(SceneError, match=f"^{kind.__name__}: 7 has no name; write [a-z_]+=..."):
+            kind(*[7] * (len(places) + 1))
+        needed = [each.name for each in fields(kind) if each.default is MISSING and each.default_factory is MISSING]
+        for name in needed:
+            with pytest.raises(SceneError, match=f"^{kind.__name__}: {name} is missing; add it$"):
+                kind(**{other: 7 for other in needed if other != name})
+
+
+MESSAGES: list[tuple[Callable[..., Any], dict[str, Any], str]] = [
+    (Scene, {"camera": clrt.Camera}, "camera: Camera is a class; write an object of it, clrt.Camera(...)"),
+    (clrt.Sphere, {"material": clrt.Mirror}, "Sphere.material: Mirror is a class; write an object of it"),
+    (clrt.Diffuse, {"color": PICTURE}, "Diffuse.color: is a Picture; write a clrt.Texture(picture=...)"),
+    (clrt.Dielectric, {"ior": (1, 1, 1)}, "Dielectric.ior: [1, 1, 1] is not a number; write one"),
+    (clrt.Sphere, {"radius": "1"}, 'Sphere.radius: "1" is not a number; write one without quotes'),
+    (clrt.Sky, {"time": "noon", "latitude": 1, "longitude": 2}, "or in Python a datetime"),
+    (clrt.RenderSettings, {"samples": 4}, 'RenderSettings: the field "samples" is unknown; did you mean "spp"?'),
+    (mesh, {"faces": [[0.0, 1.0, 2.0]]}, "faces has dtype float64; write integers"),
+]
+
+
+@pytest.mark.parametrize(("make", "values", "message"), MESSAGES)
+def test_messages_name_the_remedy(make: Callable[..., Any], values: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError, match=re.escape(message)):
+        make(**values)
 
 
 def test_errors_are_pickled() -> None:

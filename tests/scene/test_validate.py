@@ -82,12 +82,15 @@ MISTAKES: dict[str, tuple[Callable[[Scene], object], str]] = {
     "colors above 1": (set_mesh(colors=np.full((42, 3), 1.5, np.float32)), "colors[0] = [1.5, 1.5, 1.5] is not a"),
     "colors below 0": (set_mesh(colors=np.full((42, 4), -1, np.float32)), "is not a colour from 0 to 1 (and 41 more)"),
     "normals": (set_mesh(normals=np.ones((4, 3), np.float32)), "normals has shape (4, 3); it must be (42, 3)"),
-    "faces dtype": (set_mesh(faces=np.zeros((1, 3))), "faces has dtype float64; convert it"),
+    "faces dtype": (set_mesh(faces=np.zeros((1, 3))), "faces has dtype float64; write integers"),
     "faces beyond int32": (set_mesh(faces=np.array([[0, 1, 2**32]])), "faces[0] uses vertex 4294967296, but"),
     "vertices dtype": (set_mesh(vertices=np.ones((42, 3), complex)), "vertices has dtype complex128"),
     "vertices beyond float32": (set_mesh(vertices=np.full((42, 3), 1e39)), "vertices[0] = [inf, inf, inf] is not"),
     "vertices shape": (set_mesh(vertices=np.ones((9, 2), np.float32), normals=None), "shape (9, 2); it must be"),
-    "vertices list": (set_mesh(vertices=[[0, 0, 0], [1]], normals=None), "vertices is a list; write a numpy array"),
+    "vertices list": (
+        set_mesh(vertices=[[0, 0, 0], [1]], normals=None),
+        "vertices: [[0, 0, 0], [1]] is not an array of numbers; write one",
+    ),
     "no faces": (set_mesh(faces=np.zeros((0, 3), np.int32)), 'mesh "ball": has no triangles'),
     "no list": (set_scene(spheres=Sphere()), "is not a list; write spheres=[...]"),
     "no mesh": (set_scene(meshes=["ball"]), 'mesh[0]: "ball" is not of type Mesh'),
@@ -135,7 +138,7 @@ MISTAKES: dict[str, tuple[Callable[[Scene], object], str]] = {
     "sky empty": (sky(0, 4, 3), "Environment.image: has shape (0, 4, 3)"),
     "sky nan": (sky(2, 4, 3, value=NAN), "1 pixels are not finite, the first in row 1"),
     "sky negative": (sky(2, 4, 3, value=-1), "1 pixels are negative, the first in row 1"),
-    "sky dtype": (make(Environment, image=np.ones((2, 4, 3))), "is float64; write"),
+    "sky dtype": (make(Environment, image=np.ones((2, 4, 3), np.uint8)), "is uint8; write"),
     "strength": (make(Environment, strength=-1), "Environment.strength: -1 is below 0"),
 }
 

@@ -13,7 +13,7 @@ from ...scene.animation import Animation, Keyframe, SceneAnimation
 from ...scene.cameras import CameraEnd
 from ...scene.default_sky import SUN
 from ...scene.fields.field_types import field_problems, show, unknown, usable
-from ...scene.fields.validated import read_only
+from ...scene.fields.number_arrays import read_only
 from ...scene.geometry.instancing import meshes_by_id
 from ...scene.geometry.transform_faults import transform_faults
 from ...scene.lights import LIGHTS, Light

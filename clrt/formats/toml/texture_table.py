@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import ObjectError, SceneError
 from ...scene.fields.field_types import field_problems, show, usable
-from ...scene.fields.validated import read_only
+from ...scene.fields.number_arrays import read_only
 from ...scene.light_images import LightImage
 from ...scene.materials.textures import Channel, NonNegative, Pair, Picture, Texture, Wrap
 from ..images.image_reader import read_picture, read_texels

@@ -10,6 +10,7 @@ from ...errors import UsageError, check_choice
 from ...file_names import StrPath
 from ...scene.cameras import CALIBRATED, Camera
 from ...scene.exposure import camera_at
+from ...scene.fields.field_types import show
 from ...scene.fields.keywords import with_known_keywords
 from ...scene.model import Scene
 from ...scene.numbered_objects import object_names
@@ -67,6 +68,8 @@ def save_views(
         make_folder(part)
     writers = [WRITERS[each](path, scene) for each in chosen]
     for number, view in enumerate(views):
+        if not isinstance(view, View):
+            raise UsageError(f"views[{number}] is {show(view)}; give the views of clrt.each_view")
         _check_calibrated(view, number)
         saved = save_view(path, f"view_{number:05}", _in_the_middle(view), view.layers)
         for writer in writers:

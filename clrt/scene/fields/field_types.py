@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from datetime import date, datetime, time
 from functools import lru_cache, reduce
@@ -22,6 +22,8 @@ INT64_END = 2**63
 FLOAT32_MAX = (2 - 2**-23) * 2.0**127
 #: More problems than this in one object are counted, not listed.
 MOST = 12
+#: What other renderers call fields, where the name is not like clrt's.
+_SYNONYMS = {"samples": "spp", "bounces": "max_depth", "resolution": "size"}
 #: The names of the generic types of arrays; from numpy 2.5 on, NDArray[...] is an alias with a name of its own.
 _ARRAYS = frozenset({"ndarray", "NDArray"})
 
@@ -40,8 +42,7 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
     for field in fields_of(kind):
         if field.name in plain:
             problems += _problems(hints[field.name], plain[field.name], f"{where}.{field.name}")
-        elif field.default is MISSING and field.default_factory is MISSING:
-            problems.append(f"{where}: {field.name} is missing; add it")
+    problems += [f"{where}{fault}" for fault in missing_fields(kind, plain)]
     problems += [f'{where}: key "{name}" {unknown(name, hints)}' for name in plain if name not in hints]
     if problems:
         more = [f"{where}: {len(problems) - MOST} more mistakes like these"] if len(problems) > MOST else []
@@ -65,7 +66,11 @@ def unknown(name: object, known: Iterable[str]) -> str:
     import difflib
 
     known = sorted(known)
-    near = difflib.get_close_matches(str(name), known, 1) or [word for word in known if word.startswith(f"{name}_")]
+    near = (
+        [word for word in known if word == _SYNONYMS.get(str(name))]
+        or difflib.get_close_matches(str(name), known, 1)
+        or [word for word in known if word.startswith(f"{name}_")]
+    )
     if near:
         return f'is unknown; did you mean "{near[0]}"?'
     return f"is unknown; write one of {', '.join(known)}" if known else "is unknown; none is defined"
@@ -99,9 +104,30 @@ def fields_of(kind: type) -> tuple[Field[Any], ...]:
     return _fields_of(kind)
 
 
-def array_fields(kind: type) -> frozenset[str]:
-    """Return the names of a dataclass's fields that are arrays, or None."""
+def array_fields(kind: type) -> Mapping[str, type]:
+    """Return the scalar types of a dataclass's fields that are arrays, or None, by name."""
     return _array_fields(kind)
+
+
+def missing_fields(kind: type, given: Container[str]) -> list[str]:
+    """Return a problem for each field of a dataclass that has no default and is not given."""
+    return [
+        f": {field.name} is missing; add it"
+        for field in fields_of(kind)
+        if field.name not in given and field.default is MISSING and field.default_factory is MISSING
+    ]
+
+
+def value_problems(hint: Any, value: Any, where: str) -> list[str]:
+    """Return what is wrong with one value, as `field_problems` does, given its type without arrays and mappings."""
+    return list(_problems(hint, plain_value(value), where))
+
+
+def not_of_type(value: object, kind: type, name: str, example: str) -> str:
+    """Return the message that an object is of another type, or is the class itself. name: of the type."""
+    if isinstance(value, type) and issubclass(value, kind):
+        return f"{value.__name__} is a class; write an object of it, clrt.{value.__name__}(...)"
+    return f"{show(value)} is not of type {name}; {example}"
 
 
 @lru_cache
@@ -116,9 +142,16 @@ def _fields_of(kind: type) -> tuple[Field[Any], ...]:
 
 
 @lru_cache
-def _array_fields(kind: type) -> frozenset[str]:
+def _array_fields(kind: type) -> Mapping[str, type]:
     hints = get_type_hints(kind)
-    return frozenset(field.name for field in fields(kind) if _ARRAYS & _origins(hints[field.name]))
+    names = [field.name for field in fields(kind) if _ARRAYS & _origins(hints[field.name])]
+    return {name: next(each for each in _leaves(hints[name]) if hasattr(each, "dtype")) for name in names}
+
+
+def _leaves(hint: Any) -> Iterator[Any]:
+    """Yield the types that a generic type is made of."""
+    parts = get_args(hint)
+    yield from (leaf for part in parts for leaf in _leaves(part)) if parts else (hint,)
 
 
 def _is_opaque(hint: Any) -> bool:
@@ -141,13 +174,16 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
         rest = tuple(part for part in parts if part is not NoneType)
         yield from () if value is None else _problems(reduce(operator.or_, rest), value, path)
     elif origin in (Union, UnionType):
+        if not isinstance(value, tuple(filter(is_dataclass, parts))) and (made := _made_of(parts, value)):
+            yield f"{path}: is a {type(value).__name__}; write a {made}"
+            return
         meant = _meant(parts, value)
         yield from _problems(meant, value, path)
         if is_dataclass(meant) and hasattr(value, "factor"):  # a texture's, instead of a plain value
             yield from _problems(_factor(parts[0], value.factor), value.factor, f"{path}.factor")
     elif isinstance(hint, type) and is_dataclass(hint):
         if not isinstance(value, hint):
-            yield f"{path}: {show(value)} is not of type {hint.__name__}; {_example(hint)}"
+            yield f"{path}: {not_of_type(value, hint, hint.__name__, _example(hint))}"
     elif origin is Literal:
         if not (isinstance(value, str) and value in parts):
             yield f"{path}: {show(value)} {unknown(value, parts)}"
@@ -188,6 +224,20 @@ def _meant(parts: tuple[Any, ...], value: Any) -> Any:
     return next((part for kind, part in kinds if isinstance(kind, type) and isinstance(value, kind)), parts[0])
 
 
+def _made_of(parts: tuple[Any, ...], value: Any) -> str:
+    """Return how the member of a union is made that has a value as one of its fields; empty if none does."""
+    return next(
+        (
+            f"clrt.{part.__name__}({name}=...)"
+            for part in parts
+            if is_dataclass(value) and isinstance(part, type) and is_dataclass(part)
+            for name, kind in field_types(part).items()
+            if kind is type(value)
+        ),
+        "",
+    )
+
+
 def _factor(plain: Any, factor: object) -> Any:
     """Return the type of a texture's factor, given the type of the plain value; a color also accepts one number."""
     one = get_origin(plain) is tuple and not isinstance(factor, tuple)
@@ -220,17 +270,22 @@ def _fault(kind: Any, value: Any) -> str:
         return "" if finite else "is not a finite number; write one"
     if kind is tuple and (isinstance(value, list) or hasattr(value, "tolist")):
         return f"is a {type(value).__name__}; write a tuple"
-    return _REMEDIES[kind]
+    fault, if_quoted = _REMEDIES[kind]
+    return fault + if_quoted if isinstance(value, (str, float)) else fault
 
 
 _ACCEPTED: dict[Any, Any] = {float: (float, int), int: int, str: str, bool: bool, tuple: tuple, datetime: datetime}
-_REMEDIES = {
-    float: "is not a number; write one without quotes",
-    int: "is not an integer; write one without quotes or decimal point",
-    str: "is not a string; write it in quotes",
-    bool: "is not a boolean; write true or false",
-    tuple: "is not a list; write the numbers in brackets",
-    datetime: "is not a date and time; write one without quotes, such as 2026-06-21T12:00:00+02:00",
+#: What is wrong with values of other types, and what to leave out of strings and numbers.
+_REMEDIES: dict[Any, tuple[str, str]] = {
+    float: ("is not a number; write one", " without quotes"),
+    int: ("is not an integer; write one", " without quotes or decimal point"),
+    str: ("is not a string; write it in quotes", ""),
+    bool: ("is not a boolean; write true or false", ""),
+    tuple: ("is not a list; write the numbers in brackets", ""),
+    datetime: (
+        "is not a date and time; write one such as 2026-06-21T12:00:00+02:00 without quotes, or in Python a datetime",
+        "",
+    ),
 }
 _LIMITS: dict[type, tuple[Callable[[float, float], bool], str, str]] = {
     Ge: (operator.ge, "is below", "write at least"),

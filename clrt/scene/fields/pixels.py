@@ -25,7 +25,7 @@ def pixel_faults(name: str, image: object) -> list[str]:
 def _pixel_faults(name: str, image: object) -> list[str]:
     if not isinstance(image, np.ndarray) or image.dtype != np.float32:
         kind = image.dtype if isinstance(image, np.ndarray) else type(image).__name__
-        return [f"{name}: is {kind}; write a numpy array of float32"]
+        return [f"{name}: is {kind}; write an array of float32, of linear values"]
     if image.ndim != 3 or image.shape[2] != 3 or 0 in image.shape:
         return [f"{name}: has shape {image.shape}; it must be (height, width, 3) with at least one pixel"]
     problems = []

@@ -15,15 +15,16 @@ def tuples_for_lists(record: Any, without: Container[str] = ()) -> None:
     without: names of fields that keep arrays.
     """
     for field in fields_of(type(record)):
-        if field.name not in without and (plain := _plain(value := getattr(record, field.name))) is not value:
+        if field.name not in without and (plain := plain_sequence(value := getattr(record, field.name))) is not value:
             object.__setattr__(record, field.name, plain)
 
 
-def _plain(value: Any) -> Any:
+def plain_sequence(value: Any) -> Any:
+    """Return lists and arrays of numbers as tuples, and numpy's numbers as Python's; other values as they are."""
     if hasattr(value, "tolist"):  # arrays and numpy's numbers
         value = value.tolist()
     if isinstance(value, list):
-        return tuple(map(_plain, value))
+        return tuple(map(plain_sequence, value))
     if isinstance(value, tuple) and any(hasattr(entry, "tolist") for entry in value):
-        return tuple(map(_plain, value))
+        return tuple(map(plain_sequence, value))
     return value

@@ -6,15 +6,32 @@ from collections.abc import Iterable
 from typing import Any, Self
 
 from ...errors import ObjectError
-from .field_types import array_fields, field_problems, field_types, fields_of, unknown, usable
+from .field_types import (
+    array_fields,
+    field_problems,
+    field_types,
+    fields_of,
+    missing_fields,
+    show,
+    unknown,
+    usable,
+)
 from .tuples import tuples_for_lists
 
 
 class KnownFields:
-    """Base class of dataclasses that raise ObjectError for unknown keywords and attributes, with the closest one."""
+    """Base class of dataclasses that raise ObjectError for unknown keywords and attributes, with the closest one, for
+    fields that are missing, and for more fields without their names than have places."""
 
     def __new__(cls, *values: object, **named: object) -> Self:
         _check_known(cls, named)
+        places = [field.name for field in fields_of(cls) if not field.kw_only]
+        if len(values) > len(places):
+            example = next((name for name in field_types(cls) if name not in places), "name")
+            fault = f": {show(values[len(places)])} has no name; write {example}=..., or another field's name"
+            raise ObjectError(cls.__name__, [fault])
+        if faults := missing_fields(cls, {*places[: len(values)], *named}):
+            raise ObjectError(cls.__name__, faults)
         return super().__new__(cls)
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -22,19 +39,23 @@ class KnownFields:
             _check_known(type(self), (name,))
         super().__setattr__(name, value)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle it without the fields that `__new__` asks for."""
+        return object.__new__, (type(self),), self.__getstate__()
+
 
 class Validated(KnownFields):
     """Base class of dataclasses whose fields are validated when an object is made, copied or unpickled.
 
     Raises ObjectError, which names the class, the field, the value and the remedy. Lists and arrays of numbers become
-    tuples. Fields that are arrays keep read-only views: they share the memory of the array that was given, which stays
-    writable for its owner, who must not change it any more.
+    tuples. Fields that are arrays may be lists, and keep read-only views: they share the memory of the array that was
+    given, if it has the field's type, which stays writable for its owner, who must not change it any more.
     """
 
     def __post_init__(self) -> None:
         arrays = array_fields(type(self))
         for name in arrays:
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+            object.__setattr__(self, name, _stored(getattr(self, name), arrays[name]))
         tuples_for_lists(self, without=arrays)
         if faults := self.faults():
             raise ObjectError(self.title, faults)
@@ -83,7 +104,7 @@ class Editable(Validated):
 
     def __setattr__(self, name: str, value: object) -> None:
         arrays = array_fields(type(self))
-        super().__setattr__(name, read_only(value) if name in arrays else value)
+        super().__setattr__(name, _stored(value, arrays[name]) if name in arrays else value)
         vars(self).pop("_valid", None)
 
     def check(self) -> None:
@@ -99,12 +120,7 @@ def _check_known(kind: type, names: Iterable[str]) -> None:
         raise ObjectError(kind.__name__, [f': the field "{name}" {unknown(name, known)}' for name in wrong])
 
 
-def read_only(value: Any) -> Any:
-    """Return a read-only view of an array; one that is read-only, and other values, as they are."""
-    import numpy as np  # not for render settings, from which the command line reads its options
+def _stored(value: Any, kind: type) -> Any:
+    from .number_arrays import stored_array  # with numpy, not for render settings, which the command line reads
 
-    if not isinstance(value, np.ndarray) or not value.flags.writeable:
-        return value
-    view = value.view(np.ndarray)
-    view.setflags(write=False)
-    return view
+    return stored_array(value, kind)

@@ -69,9 +69,12 @@ def _array_fault(name: str, array: object, dtype: type, rows: str, columns: tupl
     """Return a fault unless `array` is a (rows, k) array of `dtype`, with k one of `columns`."""
     kind, shape = np.dtype(dtype).name, " or ".join(f"({rows}, {k})" for k in columns)
     if not isinstance(array, np.ndarray):
-        return f"{name} is a {type(array).__name__}; write a numpy array of {kind}, shape {shape}"
+        return f"{name}: {show(array)} is not an array of numbers; write one of {kind}, shape {shape}"
     if array.dtype != dtype:
-        return f"{name} has dtype {array.dtype}; convert it with .astype(np.{kind})"
+        remedy = (
+            "write integers" if dtype is np.int32 and array.dtype.kind != "i" else f"convert it with .astype(np.{kind})"
+        )
+        return f"{name} has dtype {array.dtype}; {remedy}"
     if array.ndim != 2 or array.shape[1] not in columns or (rows.isdigit() and len(array) != int(rows)):
         return f"{name} has shape {array.shape}; it must be {shape}"
     return None

@@ -13,12 +13,14 @@ from ..fields.number_arrays import real_array
 Rays = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
-def ray_arrays(origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike) -> Rays:
+def ray_arrays(
+    origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike, names: tuple[str, str] = ("origins", "directions")
+) -> Rays:
     """Broadcast to origins (n, 3), directions (n, 3) and t_max (n,); (3,), (3,) and () stand for all rays.
 
-    Raises UsageError if the shapes do not match.
+    names: what the caller calls the first two. Raises UsageError if the shapes do not match.
     """
-    given = {"origins": origins, "directions": directions, "t_max": t_max}
+    given = {names[0]: origins, names[1]: directions, "t_max": t_max}
     arrays = {name: real_array(name, values) for name, values in given.items()}
     count, counted = 1, ""
     for name, array in arrays.items():
@@ -32,7 +34,7 @@ def ray_arrays(origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike) -> R
             raise UsageError(f"{name} {array.shape}: there are {count} {counted}; give as many, or one for all")
         count, counted = rays[0], name
     return (
-        np.broadcast_to(arrays["origins"], (count, 3)),
-        np.broadcast_to(arrays["directions"], (count, 3)),
+        np.broadcast_to(arrays[names[0]], (count, 3)),
+        np.broadcast_to(arrays[names[1]], (count, 3)),
         np.broadcast_to(arrays["t_max"], count),
     )

@@ -6,13 +6,11 @@ assigned to them later, and what is wrong with them together.
 
 from __future__ import annotations
 
-from os import PathLike
-
-from ...errors import ObjectError, SceneError, UsageError
+from ...errors import ObjectError, SceneError
 from ..animation import Animation, ModelAnimation, SceneAnimation
 from ..camera_path import animation_problems
 from ..exposure import motion_features
-from ..fields.field_types import show
+from ..fields.field_types import not_of_type, show
 from ..fields.validated import Validated
 from ..lights import LIGHTS, BaseLight
 from ..materials.material_types import MATERIALS, Material
@@ -38,14 +36,6 @@ OPTIONAL: dict[str, type[Validated]] = {"backdrop": Backdrop, "ground": Ground}
 NAMED: dict[str, type[Validated]] = {"cameras": Camera, "materials": Material}
 #: Concrete types of the abstract ones.
 KINDS: dict[type, tuple[type, ...]] = {Material: MATERIALS, BaseLight: LIGHTS}
-
-
-def check_is_scene(scene: object) -> None:
-    """Raise UsageError unless it is a Scene."""
-    if isinstance(scene, (str, PathLike)):
-        raise UsageError(f"scene is the path {str(scene)!r}; read it with clrt.load")
-    if not isinstance(scene, Scene):
-        raise UsageError(f"scene is a {type(scene).__name__}; give a clrt.Scene")
 
 
 def validate(scene: Scene) -> None:
@@ -90,7 +80,8 @@ def _problems(part: object, kind: type[Validated], where: str) -> list[str]:
     """Return problems unless `part` is a valid object of this type. A mesh or instance is called by its name, too."""
     if not isinstance(part, kind):
         names = " or clrt.".join(each.__name__ for each in KINDS.get(kind, (kind,)))
-        return [f"{where}: {show(part)} is not of type {kind.__name__.removeprefix('Base')}; write a clrt.{names}"]
+        fault = not_of_type(part, kind, kind.__name__.removeprefix("Base"), f"write a clrt.{names}")
+        return [f"{where}: {fault}"]
     try:
         part.check()
         if isinstance(part, Instance):
