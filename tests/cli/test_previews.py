@@ -26,10 +26,11 @@ def test_a_file_is_whole_at_any_moment(tmp_path: Path) -> None:
     reference = run(tmp_path, "--spp", "1024", "-o", "reference.exr")
     assert reference.returncode == 0, reference.stderr
     job = subprocess.Popen([*RENDER, "--time", "4", "--preview-every", ".05", "-o", str(name), "--seed", "5"])
-    seen: dict[int, np.ndarray] = {}
+    seen: dict[tuple[int, int], np.ndarray] = {}
     while job.poll() is None:
         if name.exists():
-            seen[name.stat().st_ino] = read_image(name)
+            written = name.stat()  # the number of a file that was replaced is used again
+            seen[written.st_ino, written.st_mtime_ns] = read_image(name)
         time.sleep(0.01)
     assert job.returncode == 0 and len(seen) >= 3
     wanted = read_image(tmp_path / "reference.exr")

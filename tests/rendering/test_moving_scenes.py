@@ -76,7 +76,7 @@ def test_what_moves_far_apart_gets_a_new_bvh(device: Device) -> None:
 def test_scenes_that_are_wrong(device: Device) -> None:
     """The last image can still be rendered."""
     renderer = begun(device, scene(0))
-    with pytest.raises(clrt.UsageError, match="scene is a float"):
+    with pytest.raises(clrt.UsageError, match="scene: 3.0 is not of type Scene; write a clrt.Scene"):
         renderer.show(3.0)  # type: ignore[arg-type]
     with pytest.raises(clrt.SceneError, match="is not finite"):
         renderer.show(scene(np.nan))
