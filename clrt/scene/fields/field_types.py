@@ -256,7 +256,7 @@ def _outside(limits: Iterable[Limit | Characters], value: Any, path: str) -> Ite
     for limit in limits:
         if isinstance(limit, Characters):
             if not re.fullmatch(limit.pattern, value):
-                yield f"{path}: {show(value)} has other characters than {limit.names}; leave them out"
+                yield f"{path}: {show(value)} is not made of {limit.names} alone; leave the rest out"
             continue
         keeps, is_wrong, remedy = _LIMITS[type(limit)]
         if not keeps(value, limit.bound):
