@@ -111,11 +111,12 @@ def array_fields(kind: type) -> Mapping[str, type]:
 
 def missing_fields(kind: type, given: Container[str]) -> list[str]:
     """Return a problem for each field of a dataclass that has no default and is not given."""
-    return [
-        f": {field.name} is missing; add it"
-        for field in fields_of(kind)
-        if field.name not in given and field.default is MISSING and field.default_factory is MISSING
-    ]
+    return [f": {name} is missing; add it" for name in required_fields(kind) if name not in given]
+
+
+def required_fields(kind: type) -> list[str]:
+    """Return the names of a dataclass's fields without a default."""
+    return [field.name for field in fields_of(kind) if field.default is MISSING and field.default_factory is MISSING]
 
 
 def value_problems(hint: Any, value: Any, where: str) -> list[str]:

@@ -12,6 +12,7 @@ from .field_types import (
     field_types,
     fields_of,
     missing_fields,
+    required_fields,
     show,
     unknown,
     usable,
@@ -39,9 +40,9 @@ class KnownFields:
             _check_known(type(self), (name,))
         super().__setattr__(name, value)
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copy and pickle it without the fields that `__new__` asks for."""
-        return object.__new__, (type(self),), self.__getstate__()
+    def __getnewargs_ex__(self) -> tuple[tuple[()], dict[str, Any]]:
+        """Return what copying and unpickling give `__new__`: the fields that it asks for."""
+        return (), {name: getattr(self, name) for name in required_fields(type(self))}
 
 
 class Validated(KnownFields):
