@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import clrt
-from clrt.bench.renderers.mitsuba_renderer import contestants
+from clrt.bench.renderers import mitsuba_renderer
+from clrt.bench.renderers.mitsuba_renderer import contestants, load
 from clrt.errors import UsageError
 
 pytestmark = pytest.mark.needs("mitsuba")
@@ -33,6 +35,12 @@ FLOOR = """<scene version="3.0.0"><shape type="rectangle">
   <transform name="to_world"><rotate x="1" angle="-90"/><scale value="4"/></transform>
   <bsdf type="twosided"><bsdf type="diffuse"><rgb name="reflectance" value="0.5, 0.5, 0.5"/></bsdf></bsdf>
 </shape></scene>"""
+
+
+@pytest.fixture(autouse=True)
+def scalar(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Use the variant of the other tests: two versions of LLVM in a process may crash it."""
+    monkeypatch.setattr(mitsuba_renderer, "load", partial(load, "scalar_rgb"))
 
 
 def test_mitsuba_reads_its_own_file(tmp_path: Path) -> None:
