@@ -21,7 +21,7 @@ from clrt.device.device_info import Verdict
 from clrt.device.discovery.check_results import keep_verdict
 from clrt.device.open import Device
 from clrt.device.programs.kernel_files import kernel_digest
-from clrt.errors import DeviceError, SceneError, UsageError
+from clrt.errors import DeviceError
 from clrt.farm import dispatch
 from clrt.farm.banded_picture import BandedPicture
 from clrt.farm.cluster import Cluster, connect
@@ -326,28 +326,3 @@ def test_a_task_that_kills(processes: Processes, small_tasks: None, monkeypatch:
         found = together(cluster, room(), 2)
         with pytest.raises(DeviceError, match=r"a task of \d+ tiles, samples \d+ to \d+ has killed 2 workers, last"):
             run(found, spp=8)
-
-
-@pytest.mark.parametrize(
-    "layers", [["rgb", "depth", "flow"], ["alpha", "indirect", "normal"], ["depth", "normal", "flow"]]
-)
-def test_views_are_those_of_one_machine(processes: Processes, layers: list[str]) -> None:
-    scene = clrt.load(SCENES / "spot.toml")
-    cameras = [view.camera for _, view in clrt.frames(clrt.turntable(scene, frames=9))]
-    expected = clrt.render_views(scene, cameras, layers, size=(40, 30), spp=4)
-    found = clrt.render_views(scene, cameras, layers, size=(40, 30), spp=4, scheduler=processes.address)
-    assert list(found) == list(expected)
-    for name, layer in expected.items():
-        np.testing.assert_array_equal(found[name], layer)
-
-
-def test_views_that_a_farm_cannot_render_are_named(processes: Processes, device: Device) -> None:
-    scene, wrong = clrt.load(SCENES / "spot.toml"), "front"
-    options: dict[str, Any] = {"size": (40, 30), "scheduler": processes.address}
-    with pytest.raises(SceneError, match=r"view 1: camera: .* is not of type Camera"):
-        clrt.render_views(scene, [scene.camera, wrong], "depth", **options)  # type: ignore[list-item]
-    with pytest.raises(UsageError, match="opened devices"):
-        clrt.render_views(scene, [scene.camera], "depth", device=device, **options)
-    with pytest.raises(DeviceError, match="does not answer"):
-        clrt.render_views(scene, [scene.camera], "depth", scheduler="tcp://127.0.0.1:9")
-    assert clrt.render_views(scene, [], "depth", **options) == {}
