@@ -73,9 +73,9 @@ def each_view(
     if scheduler is None:
         rendered = _rendered(seen, given, lit)
     else:
-        from .farm.each_view import each_view as each_of_farm
+        from .farm.farm_views import farm_views
 
-        rendered = each_of_farm(scheduler, seen, given, lit)
+        rendered = farm_views(scheduler, seen, given, lit)
     for number, ((camera, following), made) in enumerate(zip(_with_next(ahead), rendered)):
         if "flow" in names:
             if motion_features(replace(scene, camera=camera)):

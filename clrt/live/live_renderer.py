@@ -60,8 +60,8 @@ class LiveRenderer:
         self._guides: dict[str, NDArray[np.float32]] = {}
         self._guided: Renderer | None = None  # renderer of these guides
         self._denoise_from = 0.0
-        self._met: NDArray[np.generic] = np.zeros((0, 0), np.int32)  # object numbers per pixel
-        self._met_by: Renderer | None = None  # renderer of these numbers
+        self._hit_objects: NDArray[np.generic] = np.zeros((0, 0), np.int32)  # object numbers per pixel
+        self._hit_objects_of: Renderer | None = None  # renderer of these numbers
 
     def quick_size(self, asked: ImageRequest) -> tuple[int, int]:
         """Return the image size that meets the target frame rate during movements; the full size if that does."""
@@ -71,7 +71,7 @@ class LiveRenderer:
     def states(self, asked: ImageRequest, size: tuple[int, int], spp: int) -> Iterator[State]:
         """Yield the image's states with increasing sample counts, up to `spp`."""
         start = time.perf_counter()
-        self._guided = self._met_by = None
+        self._guided = self._hit_objects_of = None
         self._open(asked.settings.device)
         last = self.renderer
         self.renderer = renderer = Renderer(
@@ -120,12 +120,12 @@ class LiveRenderer:
         renderer = self.renderer
         if renderer is None:
             return None
-        if self._met_by is not renderer:
-            self._met = renderer.session.first_hits(renderer.scene, ["object"])["object"]
-            self._met_by = renderer
-        row, column = (min(max(int(at * size), 0), size - 1) for at, size in zip((y, x), self._met.shape))
-        number, things = int(self._met[row, column]), objects_of(renderer.given)
-        return things[number] if 0 <= number < len(things) else None  # the ground is no object of the scene
+        if self._hit_objects_of is not renderer:
+            self._hit_objects = renderer.session.first_hits(renderer.scene, ["object"])["object"]
+            self._hit_objects_of = renderer
+        row, column = (min(max(int(at * size), 0), size - 1) for at, size in zip((y, x), self._hit_objects.shape))
+        number, objects = int(self._hit_objects[row, column]), objects_of(renderer.given)
+        return objects[number] if 0 <= number < len(objects) else None  # the ground is not one of them
 
     def abandon(self) -> None:
         """Make `states` end soon; thread-safe."""

@@ -207,7 +207,7 @@ def test_albedo_is_a_mean_over_the_pixel() -> None:
 
 @pytest.mark.parametrize("spp, rays", [(1, 1), (3, 4), (16, 16), (500, 16), (None, 16)])
 def test_means_take_the_rays_of_the_first_samples(spp: int | None, rays: int) -> None:
-    """The share of a pixel's rays that meet a wall is a multiple of 1 / rays, and not always of 2 / rays."""
+    """The fraction of a pixel's rays that hit a wall is a multiple of 1 / rays, and not always of 2 / rays."""
     slanted = quad([(-2, -2, -1), (-0.3, -2, -1), (0.3, 2, -1), (-2, 2, -1)], Diffuse())
     scene = Scene(
         meshes=[slanted],
@@ -216,9 +216,9 @@ def test_means_take_the_rays_of_the_first_samples(spp: int | None, rays: int) ->
         camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20),
     )
     renderer = Renderer(scene, aovs=["geometric_normal"], spp=spp, integrator="normals")
-    met = np.linalg.norm(np.asarray(renderer.first_hits["geometric_normal"]), axis=-1) * rays
-    np.testing.assert_allclose(met, np.rint(met), atol=1e-5)
-    assert (np.rint(met) % 2).any() and np.rint(met.max()) == rays
+    hits = np.linalg.norm(np.asarray(renderer.first_hits["geometric_normal"]), axis=-1) * rays
+    np.testing.assert_allclose(hits, np.rint(hits), atol=1e-5)
+    assert (np.rint(hits) % 2).any() and np.rint(hits.max()) == rays
 
 
 @pytest.mark.programs

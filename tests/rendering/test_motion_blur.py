@@ -114,8 +114,8 @@ def test_a_moving_ball_has_its_closed_form(device: Device, kind: str) -> None:
 
 
 def test_a_turning_camera_has_its_closed_form(device: Device) -> None:
-    """A panning pinhole camera in an environment that is black on one side of an azimuth: a pixel is white for the time
-    that its own azimuth is on the other side, as it turns at a constant rate. The edge is a texel wide."""
+    """A pinhole camera pans at a constant rate in an environment that is black on one side of an azimuth: a pixel is as
+    bright as the fraction of the exposure in which its own azimuth is on the white side. The edge is one texel wide."""
     texels, angle, size = 4096, 0.5, (24, 16)
     image = np.zeros((8, texels, 3), np.float32)
     image[:, texels // 2 :] = 1  # from +Z on, via −X … (docs/scene-format.md)

@@ -37,8 +37,7 @@ class Transform:
         return np.array(self.matrix, np.float64)
 
     def turn_fault(self, motion: Mapping[str, Any]) -> str | None:
-        """Return what is wrong with the rotation from this table's to that of its `motion`, which is less than a half
-        turn; None if nothing is."""
+        """Return the problem of a `motion` that rotates by more than a half turn about an axis; None if it does not."""
         start, end = self.rotate_degrees, tuple(motion.get("rotate_degrees", self.rotate_degrees))
         if all(abs(after - before) <= 180 for before, after in zip(start, end)):
             return None

@@ -34,6 +34,7 @@ from .built_in_environments import built_in_name
 from .texture_table import LightImageTable, TextureTable
 from .values import is_plain, toml_key, toml_value
 
+log = logging.getLogger(__name__)
 #: Fields that are written even at their default, since users change them first.
 TELLING = {
     "position",
@@ -401,7 +402,7 @@ def _pivot_key(instance: Instance) -> dict[str, tuple[float, ...]]:
         return {}
     axes = instance.pivot[:, :3]
     if not np.allclose(axes, np.eye(3)):
-        logging.getLogger(__name__).warning(
+        log.warning(
             "%s: turns about the axes of its mesh in the saved scene, not those of its pivot; between the start and "
             "the end of the exposure it may be elsewhere",
             instance.title,

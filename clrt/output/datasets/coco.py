@@ -20,7 +20,7 @@ OBJECTS = ("instance_id", "object")
 class CocoWriter:
     """Collects the annotations, and writes them to annotations.json at the end.
 
-    names: of the objects to annotate, by number; the ground of a bare model is none of them.
+    names: of the objects to annotate, by number; the ground of a bare model is not among them.
     """
 
     def __init__(self, folder: Path, names: Sequence[str]) -> None:

@@ -16,7 +16,7 @@ from .orders import PictureOrder, worker_selectors
 from .whole_pictures import WholePictures
 
 
-def each_view(
+def farm_views(
     scheduler: str, scenes: Iterable[Scene], options: RendererOptions, lit: bool
 ) -> Iterator[dict[str, NDArray[Any]]]:
     """Yield the AOVs of each scene, and "rgb" and "alpha" if `lit`, in order, from the workers of a scheduler.
