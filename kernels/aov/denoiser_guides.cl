@@ -23,8 +23,8 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
     real3 absorption = splat(ZERO);
 #endif
     for (int depth = 1;; ++depth) {
-        Surface surface;
-        Hits hits = first_surface(scene, origin, direction, depth == 1, active, sampler, &surface);
+        Hits hits = first_surface(scene, origin, direction, depth == 1, active, sampler);
+        Surface surface = surface_at(scene, origin, direction, &hits);
         ireal hit = active & (hits.primitive >= 0);
 #if ATTENUATION
         tint = mul(tint, attenuated(absorption, hit ? hits.t : (real)(INFINITY)));

@@ -32,7 +32,8 @@ static inline real3 seen_position(const Scene *scene, const Surface *surface) { 
 // lanes that hit one.
 static inline ireal meet(const Scene *scene, const CameraRay *ray, ireal active, Sampler *sampler, Surface *surface,
                          ireal *primitive, ireal *instance) {
-    Hits hits = first_surface(scene, ray->origin, ray->direction, true, active, sampler, surface);
+    Hits hits = first_surface(scene, ray->origin, ray->direction, true, active, sampler);
+    *surface = surface_at(scene, ray->origin, ray->direction, &hits);
     ireal hit = active & (hits.primitive >= 0);
     *primitive = hit ? hits.primitive : (ireal)(-1);
     *instance = hit ? hits.instance : (ireal)(0);

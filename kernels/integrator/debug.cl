@@ -153,8 +153,8 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
     Path path = path_along(ray.origin, ray.direction);
     for (int depth = 1; ANY(arrived); ++depth) {
         VertexLanes v = blank_vertex();
-        Surface surface;
-        Hits hits = first_surface(&scene, path.origin, path.wi, depth == 1, active, &sampler, &surface);
+        Hits hits = first_surface(&scene, path.origin, path.wi, depth == 1, active, &sampler);
+        Surface surface = surface_at(&scene, path.origin, path.wi, &hits);
         ireal hit = active & (hits.primitive >= 0);
         absorb(&path, hit ? hits.t : (real)(INFINITY));
         note_arrival(&scene, &path, &surface, &hits, hit, active & !hit, depth, &v);

@@ -13,8 +13,8 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
                                ureal *rays, real3 *direct, real *removed ALPHA_PARAMETER) {
     *rays += active ? (ureal)(1) : (ureal)(0);
 #if PRIMITIVES
-    Surface surface;
-    Hits hits = first_surface(scene, ray->origin, ray->direction, true, active, sampler, &surface);
+    Hits hits = first_surface(scene, ray->origin, ray->direction, true, active, sampler);
+    Surface surface = surface_at(scene, ray->origin, ray->direction, &hits);
     ireal hit = active & (hits.primitive >= 0);
 #if ALPHA
     *alpha = hit ? ONE : ZERO;

@@ -85,13 +85,13 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
         // Intersect the ray with the scene
-        Surface surface;
 #if RASTER
         Hits next = depth == 1 ? *closest : closest_hit(scene, origin, direction, (real)(INFINITY), active);
-        Hits hits = first_surface_from(scene, &next, origin, direction, depth == 1, active, sampler, &surface);
+        Hits hits = first_surface_from(scene, &next, origin, direction, depth == 1, active, sampler);
 #else
-        Hits hits = first_surface(scene, origin, direction, depth == 1, active, sampler, &surface);
+        Hits hits = first_surface(scene, origin, direction, depth == 1, active, sampler);
 #endif
+        Surface surface = surface_at(scene, origin, direction, &hits);
         ireal hit = active & (hits.primitive >= 0);
 #if ATTENUATION
         beta = mul(beta, attenuated(absorption, hit ? hits.t : (real)(INFINITY)));

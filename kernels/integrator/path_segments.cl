@@ -11,8 +11,8 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
     for (;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
         VISIT(segments, depth);
-        Surface surface;
-        Hits hits = first_surface(scene, path.origin, path.wi, depth == 1, active, sampler, &surface);
+        Hits hits = first_surface(scene, path.origin, path.wi, depth == 1, active, sampler);
+        Surface surface = surface_at(scene, path.origin, path.wi, &hits);
         ireal hit = active & (hits.primitive >= 0);
 #if CATCHER
         if (depth == 1) {

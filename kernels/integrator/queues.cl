@@ -74,8 +74,7 @@ kernel void extend(SCENE_PARAMETERS, QUEUE_PARAMETERS, global const uint *tiles,
         SET_SLOT_TIME(scene, launch, tiles, as_uint(origin.w))
 #if OPACITY
         Sampler sampler = slot_sampler(&launch, tiles, as_uint(origin.w), as_uint(wi.w));
-        Surface surface;
-        Hits hits = first_surface(&scene, xyz(origin), xyz(wi), depth == 1, true, &sampler, &surface);
+        Hits hits = first_surface(&scene, xyz(origin), xyz(wi), depth == 1, true, &sampler);
         row[q.capacity].w = as_float(sampler.dimension);
 #else
         Hits hits = closest_hit(&scene, xyz(origin), xyz(wi), INFINITY, true);

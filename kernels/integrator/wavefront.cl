@@ -161,9 +161,7 @@ __attribute__((noinline)) static void trace(Scene *scene, Wave *w, int count, in
         SET_SLOT_OBJECTS_TIME(w, travel.slot)
 #if OPACITY
         Sampler sampler = slot_sampler(w, travel.slot);
-        Surface surface;
-        Hits hits = first_surface(scene, travel.path.origin, travel.path.wi, depth == 1, lanes_of(i, count), &sampler,
-                                  &surface);
+        Hits hits = first_surface(scene, travel.path.origin, travel.path.wi, depth == 1, lanes_of(i, count), &sampler);
         dimension = sampler.dimension;
 #else
         Hits hits = closest_hit(scene, travel.path.origin, travel.path.wi, (real)(INFINITY), lanes_of(i, count));

@@ -33,7 +33,7 @@ kernel void query_next_hit(SCENE_PARAMETERS, QUERY_RAYS, global RayHit *hits, fl
 #if INSTANCES
     after.instance = GATHER(ireal, hits, rays.row, .instance);
 #endif
-    Hits found = next_hit(&scene, rays.origin, rays.direction, rays.t_max, rays.valid, &after);
+    Hits found = next_hit(&scene, rays.origin, rays.direction, rays.t_max, rays.valid, &after, SEARCH_CLOSEST);
     store_hits(hits, &rays, first, count, &found);
 }
 #else

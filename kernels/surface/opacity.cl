@@ -17,6 +17,13 @@
 #define HIDE_FROM_CAMERA(name)
 #endif
 
+// Whether rays may pass the primitives at the hits: not if these are opaque whatever the direction. scene->opaque: 0 for
+// primitives that need not be opaque, 1 for those that are to all rays but the camera's, 2 to all.
+static inline ireal may_pass(const Scene *scene, const Hits *hits, int from_camera) {
+    ireal opaque = GATHER(ireal, scene->opaque, stored_primitive(scene, hits), .rays);
+    return (hits->primitive >= 0) & (opaque <= (from_camera ? 1 : 0));
+}
+
 // The opacity of surfaces for light along `direction`, before turn_towards. from_camera: whether the ray is a camera
 // ray, to which some surfaces are invisible, or culled on their back side.
 static inline real opacity_at(const Scene *scene, const Surface *surface, real3 direction, int from_camera) {

@@ -151,14 +151,20 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
 }
 #endif
 
-// Return the surfaces at the hits; lanes that missed get the surface of primitive 0.
-static inline Surface surface_at(const Scene *scene, real3 origin, real3 direction, const Hits *hits) {
-    Surface surface;
+// Return the indices of the primitives at the hits in the buffers of all; 0 in lanes that missed.
+static inline ireal stored_primitive(const Scene *scene, const Hits *hits) {
     ireal primitive = hits->primitive < 0 ? (ireal)(0) : hits->primitive;
 #if INSTANCES
     ireal instance = hits->primitive < 0 ? (ireal)(0) : hits->instance;
     primitive += hits->primitive < 0 ? (ireal)(0) : GATHER(ireal, scene->placements, instance, .first);
 #endif
+    return primitive;
+}
+
+// Return the surfaces at the hits; lanes that missed get the surface of primitive 0.
+static inline Surface surface_at(const Scene *scene, real3 origin, real3 direction, const Hits *hits) {
+    Surface surface;
+    ireal primitive = stored_primitive(scene, hits);
 #if TRIANGLES && SPHERES
     ireal is_sphere = primitive >= scene->counts.triangles;
     triangle_surface(scene, hits, is_sphere ? (ireal)(0) : primitive, &surface);

@@ -35,7 +35,7 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int first, i
 #endif
 }
 
-static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const int search,
                            const Hit *nearest) {
     Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
@@ -70,8 +70,8 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
             }
 #endif
             VISIT(leaves, first);
-            hit_leaf(scene, &leaf, first, count, stop_at_first, &hit);
-            if (stop_at_first && hit.primitive >= 0) return hit;
+            hit_leaf(scene, &leaf, first, count, search == SEARCH_ANY, &hit);
+            if (ends_search(scene, search, &hit)) return hit;
         }
         do {
             if (top == 0) return hit;

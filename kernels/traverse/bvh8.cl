@@ -42,7 +42,7 @@ static inline uint enter_boxes(const SlabRay *ray, global const Node *node, floa
 }
 
 __attribute__((always_inline))
-static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const int search,
                            const Hit *nearest) {
     Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
@@ -88,8 +88,8 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
                 continue;
             }
 #endif
-            hit_leaf(scene, &leaf, reference, stop_at_first, &hit);
-            if (stop_at_first && hit.primitive >= 0) return hit;
+            hit_leaf(scene, &leaf, reference, search == SEARCH_ANY, &hit);
+            if (ends_search(scene, search, &hit)) return hit;
         }
         for (;;) {
             if (top == 0) return hit;

@@ -94,7 +94,7 @@ static inline uint octant(const SlabRay *ray) {
     return (ray->backward[0] ? 0 : 1) | (ray->backward[1] ? 0 : 2) | (ray->backward[2] ? 0 : 4);
 }
 
-static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const int search,
                            const Hit *nearest) {
     Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
@@ -119,8 +119,8 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
         }
 #endif
         for (; primitives.bits; primitives.bits &= primitives.bits - 1) {
-            hit_primitive(scene, &leaf, primitives.first + first_bit(primitives.bits), stop_at_first, &hit);
-            if (stop_at_first && hit.primitive >= 0) return hit;
+            hit_primitive(scene, &leaf, primitives.first + first_bit(primitives.bits), search == SEARCH_ANY, &hit);
+            if (ends_search(scene, search, &hit)) return hit;
         }
         if (nodes.bits <= 0x00ffffff) {
             if (top == 0) return hit;

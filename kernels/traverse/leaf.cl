@@ -1,7 +1,7 @@
 // Leaf intersection; BVH traversal uses only the two functions of this file.
 //
 // Of several hits at the same t the lowest primitive wins (of the lowest instance), so the result does not depend on
-// the BVH. `stop_at_first` is a compile-time constant at every call: with it, the search ends at the first hit found.
+// the BVH. `search` and `stop_at_first` are compile-time constants at every call, see traverse/trace.cl.
 #include "geometry/wide.cl"
 #include "traverse/visits.cl"
 #include TRIANGLE_TEST
@@ -61,6 +61,19 @@ static inline void keep_closest(const LeafRay *ray, Hit *hit, float t, float u, 
 #endif
     if (t < hit->t || (t == hit->t && comes_before(RAYS_INSTANCE(ray), primitive, INSTANCE_OF(hit), hit->primitive)))
         *hit = HIT(ray, t, u, v, primitive);
+}
+
+static inline bool ends_search(const Scene *scene, const int search, const Hit *hit) {
+#if OPACITY
+    if (search == SEARCH_OPAQUE && hit->primitive >= 0) {
+        int first = 0;
+#if INSTANCES
+        first = RECORD(scene->placements, hit->instance)->first;
+#endif
+        return RECORD(scene->opaque, first + hit->primitive)->rays > 0;
+    }
+#endif
+    return search == SEARCH_ANY && hit->primitive >= 0;
 }
 
 #if TRIANGLES

@@ -6,8 +6,9 @@ static inline TreeRays tree_rays(const Scene *scene, real3 origin, real3 directi
     return leaf_rays(origin, direction);
 }
 
-static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const int search,
                            const Hit *nearest) {
+    const bool stop_at_first = search == SEARCH_ANY;
     Hit hit = *nearest;
     LeafRay leaf = leaf_ray(rays, ray, lane);
 #if TRIANGLES

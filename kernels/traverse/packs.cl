@@ -54,8 +54,9 @@ static inline TreeRays tree_rays(const Scene *scene, real3 origin, real3 directi
 }
 
 __attribute__((always_inline))
-static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const int search,
                            const Hit *nearest) {
+    const bool stop_at_first = search == SEARCH_ANY;
     Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
 #if TRIANGLES

@@ -10,6 +10,12 @@ static inline Hits choose_hits(ireal mask, const Hits *a, const Hits *b) {
                   mask ? a->instance : b->instance};
 }
 
+// Where a search ends: at the closest hit, at the first one found (`stop_at_first`), or there if the closest hit so far is
+// on a primitive that is opaque to all rays.
+#define SEARCH_CLOSEST 0
+#define SEARCH_ANY 1
+#define SEARCH_OPAQUE 2
+
 #include TREE
 #include LONE_SPHERES_FILE
 
@@ -45,9 +51,9 @@ static inline ireal is_ray(real3 origin, real3 direction) {
 }
 
 // The closest hit of each active lane's ray with 0 < t < t_max; if NEXT_HIT the first one after `after`, in the order
-// of (t, instance, primitive).
+// of (t, instance, primitive). search: where it may end (traverse/leaf.cl).
 static inline Hits next_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active,
-                            const Hits *after) {
+                            const Hits *after, const int search) {
     Hits hits = {(real)(INFINITY), ZERO, ZERO, (ireal)(-1), (ireal)(0)};
 #if PRIMITIVES
     ireal enabled = active & is_ray(origin, direction);
@@ -79,7 +85,7 @@ static inline Hits next_hit(const Scene *scene, real3 origin, real3 direction, r
 #endif
         VISIT(closest, 0);
         const Hit nearest = {t.lane[lane], 0.0f, 0.0f, primitive.lane[lane]};
-        Hit hit = traverse(scene, &rays, &ray, lane, false, &nearest);
+        Hit hit = traverse(scene, &rays, &ray, lane, search, &nearest);
         t.lane[lane] = hit.t;
         u.lane[lane] = hit.u;
         v.lane[lane] = hit.v;
@@ -96,7 +102,7 @@ static inline Hits next_hit(const Scene *scene, real3 origin, real3 direction, r
 
 static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
     const Hits none = NO_HIT;
-    return next_hit(scene, origin, direction, t_max, active, &none);
+    return next_hit(scene, origin, direction, t_max, active, &none, SEARCH_CLOSEST);
 }
 
 // Return the active lanes whose rays hit anything with 0 < t < t_max.
@@ -121,7 +127,7 @@ static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, r
 #endif
         VISIT(blocked, 0);
         const Hit none = {ray.t_max, 0.0f, 0.0f, -1};
-        found.lane[lane] = traverse(scene, &rays, &ray, lane, true, &none).primitive;
+        found.lane[lane] = traverse(scene, &rays, &ray, lane, SEARCH_ANY, &none).primitive;
     }
     blocked = blocked | (found.all >= 0);
 #endif

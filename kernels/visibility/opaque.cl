@@ -2,12 +2,8 @@
 #include "surface/surface.cl"
 #include "sampler/interface.cl"
 
-// The surfaces at known closest hits; lanes that missed get that of primitive 0.
 static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 origin, real3 direction,
-                                      int from_camera, ireal active, Sampler *sampler, Surface *surface) {
-#if PRIMITIVES
-    *surface = surface_at(scene, origin, direction, closest);
-#endif
+                                      int from_camera, ireal active, Sampler *sampler) {
     return *closest;
 }
 

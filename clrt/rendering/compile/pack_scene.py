@@ -25,6 +25,7 @@ from .choices import Choices
 from .film_record import film_features, film_groups
 from .geometry.pack_geometry import TriangleCorners, normal_records, sphere_records, triangle_records
 from .geometry.pack_instances import ObjectIds, PackedInstances
+from .geometry.pack_opaque import opaque_records
 from .geometry.vertex_attributes import pack_corners
 from .lights.emitter_groups import pack_emitter_groups
 from .lights.environment_map import EnvironmentMap
@@ -161,6 +162,8 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: R
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
     counts = _counts(shapes, emitters)
     film, groups = film_features(scene, choices), film_groups(scene, choices)
+    if materials.with_value("opacity") or "CATCHER" in film:
+        buffers["opaque"] = ("Opaque", opaque_records(shapes.scene, shapes.users, shapes.placements, emitters))
     if groups:
         buffers |= pack_emitter_groups(shapes.scene, emitters, groups)
     return PackedScene(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, counts, film, groups)

@@ -41,6 +41,8 @@ MOTION = record(
 )
 #: The number of a placement's motion, or −1.
 MOTION_NUMBER = np.dtype([("motion", "i4")])
+#: Which rays a primitive is opaque to, whatever their direction: 0 not all, 1 all but camera rays, 2 all.
+OPAQUE = np.dtype([("rays", "u1")])
 
 #: A light, a group of lights, or an infinite light (kernels/light/choice.cl, tree.cl).
 LIGHT_GROUP = record(
