@@ -163,7 +163,8 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: R
     counts = _counts(shapes, emitters)
     film, groups = film_features(scene, choices), film_groups(scene, choices)
     if materials.with_value("opacity") or "CATCHER" in film:
-        buffers["opaque"] = ("Opaque", opaque_records(shapes.scene, shapes.users, shapes.placements, emitters))
+        lights = np.concatenate([emitters.triangle, emitters.sphere])
+        buffers["opaque"] = ("Opaque", opaque_records(shapes.scene, shapes.users, shapes.placements, lights))
     if groups:
         buffers |= pack_emitter_groups(shapes.scene, emitters, groups)
     return PackedScene(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, counts, film, groups)

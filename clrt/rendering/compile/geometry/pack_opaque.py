@@ -10,18 +10,17 @@ from numpy.typing import NDArray
 from ....scene.materials.material_types import Material
 from ....scene.model import Scene
 from ....scene.render_settings import Culling
-from ..lights.pack_lights import PackedLights
 from ..records import OPAQUE
 from .pack_instances import PackedInstances
 
 
 def opaque_records(
-    scene: Scene, users: Sequence[Material], placements: PackedInstances, emitters: PackedLights
+    scene: Scene, users: Sequence[Material], placements: PackedInstances, lights: NDArray[np.int32]
 ) -> NDArray[np.void]:
     """Return OPAQUE records of all triangles and spheres.
 
-    scene: with the meshes that instances show first; users: materials of its meshes, spheres and instances. Emitters
-    are not opaque to all rays: shadow rays end at the emitter that they were sent to.
+    scene: with the meshes that instances show first; users: materials of its meshes, spheres and instances; lights: of
+    each triangle and sphere, or −1. Emitters are not opaque to all rays: shadow rays end at the one they were sent to.
     """
     catchers = any(user.catcher for user in users)
     each = [0 if catchers and not user.catcher else _opaque_to(user, scene.render.back_face_culling) for user in users]
@@ -29,7 +28,7 @@ def opaque_records(
     placed = placements.mesh[len(placements.mesh) - len(instances) :]
     np.minimum.at(meshes, placed, instances)
     records = np.concatenate([np.repeat(meshes, [len(mesh.faces) for mesh in scene.meshes]), spheres]).view(OPAQUE)
-    records["rays"][np.concatenate([emitters.triangle, emitters.sphere]) >= 0] = 0
+    records["rays"][lights >= 0] = 0
     return records
 
 
