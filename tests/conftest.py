@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from functools import cache
 from importlib.util import find_spec
 from shutil import which
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from .program_cache import remove_oldest
 from .this_tree import other_file
 
 if TYPE_CHECKING:
+    from clrt.device.device_info import DeviceInfo
     from clrt.device.open import Device
 
 #: Folder → the group of its tests (see setup.cfg).
@@ -59,12 +61,18 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
                 pytest.skip(f"needs {name}")
 
 
-def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run a test with the `device` fixture on every usable device, except simulators, which would take hours."""
-    if "device" in metafunc.fixturenames:
-        from clrt.device.discovery.discover import find_devices
+@cache
+def tested_devices() -> list[DeviceInfo]:
+    """Return all usable devices, except simulators, which would take hours."""
+    from clrt.device.discovery.discover import find_devices
 
-        found = [info for info, _ in find_devices() if info.usable and info.type != "simulator"]
+    return [info for info, _ in find_devices() if info.usable and info.type != "simulator"]
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run a test with the `device` fixture on every tested device."""
+    if "device" in metafunc.fixturenames:
+        found = tested_devices()
         metafunc.parametrize(
             "device",
             [info.index for info in found],
