@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cache
 from typing import Any, Self
 
 from ...errors import ObjectError
@@ -122,6 +123,12 @@ def _check_known(kind: type, names: Iterable[str]) -> None:
 
 
 def _stored(value: Any, kind: type) -> Any:
+    """Return a field that is an array as it is stored; None and others as they are, without loading numpy."""
+    return _array_converter()(value, kind) if isinstance(value, list | tuple) or hasattr(value, "dtype") else value
+
+
+@cache
+def _array_converter() -> Callable[[Any, Any], Any]:
     from .number_arrays import stored_array  # with numpy, not for render settings, which the command line reads
 
-    return stored_array(value, kind)
+    return stored_array
