@@ -66,19 +66,19 @@ def _query(device: Device, star: StarMesh, **options: Any) -> RayQuery:
 def _check_hits(query: RayQuery, star: StarMesh, rays: Rays, findings: Findings) -> NDArray[Any]:
     """Check whether, what and where each ray hits, also with rays that end before or behind it; return the hits."""
     hits = query.closest_hit(rays.origins, rays.directions)
-    meets = np.isfinite(rays.t)
+    hit = np.isfinite(rays.t)
     shown = ("from", rays.origins), ("along", rays.directions), ("gave", hits)
-    findings.expect((hits["primitive"] >= 0) == meets, "whether a ray hits", *shown)
+    findings.expect((hits["primitive"] >= 0) == hit, "whether a ray hits", *shown)
     met = star.faces[np.maximum(hits["primitive"], 0)]
     right = np.all(np.any(met[:, :, None] == rays.corners[:, None, :], axis=1), axis=1)
-    findings.expect(right | ~meets, "which triangle a ray hits", *shown)
+    findings.expect(right | ~hit, "which triangle a ray hits", *shown)
     tree = f"hit in {query.tree.name} by {query.tree.builder}"
     findings.at_most(ROUNDINGS, _errors(star, rays, hits), tree, "roundings", rays.origins, rays.directions, hits)
     for part, where in ((0.875, "before"), (1.125, "behind")):
         blocked = query.any_hit(rays.origins, rays.directions, part * rays.t)
         first = query.closest_hit(rays.origins, rays.directions, part * rays.t)["primitive"]
-        findings.expect(blocked == (meets & (part > 1)), f"any hit of a ray that ends {where} it", *shown)
-        findings.expect((first >= 0) == (meets & (part > 1)), f"first hit of a ray that ends {where} it", *shown)
+        findings.expect(blocked == (hit & (part > 1)), f"any hit of a ray that ends {where} it", *shown)
+        findings.expect((first >= 0) == (hit & (part > 1)), f"first hit of a ray that ends {where} it", *shown)
     return hits
 
 

@@ -79,7 +79,7 @@ def rays_from_elsewhere(star: StarMesh, count: int) -> Rays:
     rng, size = np.random.default_rng(9), int(np.abs(star.vertices).max())
     origins, targets = rng.integers(-2 * size, 2 * size, (2, count, 3))
     origins[::2] //= 16
-    t, least, cosine = meet_planes(star, origins, targets - origins)
+    t, least, cosine = intersect_planes(star, origins, targets - origins)
     far = (least < -CLEAR) | (t < -CLEAR)
     clear = np.all(far | (least > CLEAR) & (t > CLEAR) & (np.abs(cosine) > CLEAR), axis=1)
     t = np.where(far, np.inf, t)[clear]
@@ -90,7 +90,7 @@ def rays_from_elsewhere(star: StarMesh, count: int) -> Rays:
     return Rays(origins[clear].astype(np.float64), directions.astype(np.float64), nearest, corners)
 
 
-def meet_planes(star: StarMesh, origins: Integers, directions: Integers) -> tuple[Doubles, Doubles, Doubles]:
+def intersect_planes(star: StarMesh, origins: Integers, directions: Integers) -> tuple[Doubles, Doubles, Doubles]:
     """Return (n, m) each: t at the triangles' planes, the least barycentric coordinate there, and the cosine.
 
     All are quotients of integers below 2^53, which are exact.

@@ -27,7 +27,7 @@ class SceneNames:
 
     def hits(self, primitive: NDArray[np.int32], instance: NDArray[np.int32]) -> tuple[IntArray, IntArray]:
         """Return the objects that were hit, and which of their triangles, both (n,); −1 at misses."""
-        return self._compiled.objects.met(primitive, instance)
+        return self._compiled.objects.at_hits(primitive, instance)
 
     def object(self, number: int) -> str:
         """Return an object's kind and name, and its number if others share those."""

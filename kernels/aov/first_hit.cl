@@ -30,8 +30,8 @@ static inline real3 seen_position(const Scene *scene, const Surface *surface) { 
 
 // Intersect camera rays with the first surface that is not transparent and turn it towards the camera. Returns the
 // lanes that hit one.
-static inline ireal meet(const Scene *scene, const CameraRay *ray, ireal active, Sampler *sampler, Surface *surface,
-                         ireal *primitive, ireal *instance) {
+static inline ireal intersect(const Scene *scene, const CameraRay *ray, ireal active, Sampler *sampler,
+                              Surface *surface, ireal *primitive, ireal *instance) {
     Hits hits = first_surface(scene, ray->origin, ray->direction, true, active, sampler);
     *surface = surface_at(scene, ray->origin, ray->direction, &hits);
     ireal hit = active & (hits.primitive >= 0);
@@ -65,7 +65,7 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
         sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
         SET_TIME(scene, launch, sampler, own.y)
         active = own.inside & camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler, &ray);
-        hit = meet(&scene, &ray, active, &sampler, &surface, &other, &other);
+        hit = intersect(&scene, &ray, active, &sampler, &surface, &other, &other);
         SEEN_MEANS(ADD)
     }
 #if ONE_SAMPLE
@@ -80,7 +80,7 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
     SET_MIDDLE_TIME(scene, launch, own.y)
     active = own.inside & camera_ray(&scene, &pinhole, own.x, own.y, middle, &sampler, &ray);
 #endif
-    hit = meet(&scene, &ray, active, &sampler, &surface, &primitive, &instance);
+    hit = intersect(&scene, &ray, active, &sampler, &surface, &primitive, &instance);
     SEEN_MIDDLE(ADD)
 #endif
     if (loops_ended(launch.width)) return;

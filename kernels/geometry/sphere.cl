@@ -16,7 +16,7 @@
     static inline Twice name##_dot(const Twice a[3], const Twice b[3]) { \
         return name##_sum(name##_sum(name##_product(a[0], b[0]), name##_product(a[1], b[1])), name##_product(a[2], b[2])); \
     } \
-    static inline mask name##_may_meet(const type f[3], const type d[3], float radius) { \
+    static inline mask name##_may_hit(const type f[3], const type d[3], float radius) { \
         type x = f[1] * d[2] - f[2] * d[1], y = f[2] * d[0] - f[0] * d[2], z = f[0] * d[1] - f[1] * d[0]; \
         type a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], b = f[0] * d[0] + f[1] * d[1] + f[2] * d[2]; \
         type ff = f[0] * f[0] + f[1] * f[1] + f[2] * f[2], rounding = 64.0f * UNIT_ROUNDOFF * ff, r2 = radius * radius; \

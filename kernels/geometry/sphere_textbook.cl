@@ -3,7 +3,7 @@
 #include "core/vector.cl"
 
 #define SPHERE_OF(type, mask, Twice, name) \
-    static inline mask name##_may_meet(const type f[3], const type d[3], float radius) { \
+    static inline mask name##_may_hit(const type f[3], const type d[3], float radius) { \
         type a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], b = f[0] * d[0] + f[1] * d[1] + f[2] * d[2]; \
         return b * b >= a * (f[0] * f[0] + f[1] * f[1] + f[2] * f[2] - radius * radius); \
     } \

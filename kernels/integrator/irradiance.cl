@@ -14,13 +14,7 @@ static inline ireal aim_from_point(const Scene *scene, const Path *receiver, rea
     real3 contribution = scale(light.radiance, pdf);
     ireal useful = active & !(light.pdf <= 0.0f) & carries_light(contribution) & (dot3(light.wi, ng) > 0.0f);
     real weight = (light.delta ? ONE : light_sample_weight(light.pdf, pdf)) / light.pdf;
-    ray->origin = offset_origin(receiver->p, error, ng, light.wi);
-    ray->target = light.target;
-    ray->wi = light.wi;
-    ray->infinite = light.infinite;
-#if OPACITY
-    ray->light = number;
-#endif
+    aim(ray, receiver->p, error, ng, &light, number);
     ray->contribution = scale(contribution, weight);
     return useful;
 }

@@ -155,6 +155,17 @@ typedef struct {
     real3 contribution;
 } ShadowRay;
 
+// Set where a shadow ray starts, at a point of a surface, and where it ends: at light `number`.
+static inline void aim(ShadowRay *ray, real3 p, real3 p_error, real3 ng, const LightSample *light, ireal number) {
+    ray->origin = offset_origin(p, p_error, ng, light->wi);
+    ray->target = light->target;
+    ray->wi = light->wi;
+    ray->infinite = light->infinite;
+#if OPACITY || EMITTER_GROUPS
+    ray->light = number;
+#endif
+}
+
 // Trace the shadow rays of the lanes `sent`; return their contributions.
 static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal sent) {
 #if OPACITY
@@ -178,13 +189,7 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     real3 contribution = mul(bsdf.value, light.radiance);
     ireal useful = active & !(light.pdf <= 0.0f) & carries_light(contribution);
     if (!ANY(useful)) return useful;
-    ray->origin = offset_origin(surface->p, surface->p_error, surface->ng, light.wi);
-    ray->target = light.target;
-    ray->wi = light.wi;
-    ray->infinite = light.infinite;
-#if OPACITY || EMITTER_GROUPS
-    ray->light = number;
-#endif
+    aim(ray, surface->p, surface->p_error, surface->ng, &light, number);
 #if ATTENUATION
     real3 absorption = absorption_along(shading, surface, light.wi, path->absorption);
     real distance = light.infinite ? (real)(INFINITY) : length3(sub(light.target, ray->origin));

@@ -3,11 +3,9 @@
 #include "light/image.cl"
 
 static inline LightSample goniometric_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
-    LightSample s;
-    s.target = GATHER3(scene->goniometric_lights, index, .position);
-    real3 d = sub(s.target, p);
-    real d2 = dot3(d, d), inverse = rsqrt(d2);
-    s.wi = scale(d, inverse);
+    real d2;
+    LightSample s = sample_of_point(GATHER3(scene->goniometric_lights, index, .position), p, &d2);
+    real inverse = rsqrt(d2);
     real ahead = -dot3(s.wi, GATHER3(scene->goniometric_lights, index, .axis));
     real right = -dot3(s.wi, GATHER3(scene->goniometric_lights, index, .right));
     real top = -dot3(s.wi, GATHER3(scene->goniometric_lights, index, .top));
@@ -19,8 +17,5 @@ static inline LightSample goniometric_light_sample(const Scene *scene, ireal ind
 #if LIGHT_RANGES
     s.radiance = scale(s.radiance, within_range(d2, GATHER(real, scene->goniometric_lights, index, .per_range2)));
 #endif
-    s.pdf = ONE;
-    s.infinite = NO_LANES;
-    s.delta = ALL_LANES;
     return s;
 }

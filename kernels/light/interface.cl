@@ -25,6 +25,19 @@ typedef struct {
     ireal delta;        // no ray hits the light, so its samples count in full
 } LightSample;
 
+// A sample of a light without a size at `position`, but for its radiance. *d2: the squared distance to p.
+static inline LightSample sample_of_point(real3 position, real3 p, real *d2) {
+    real3 d = sub(position, p);
+    *d2 = dot3(d, d);
+    LightSample s;
+    s.target = position;
+    s.wi = scale(d, rsqrt(*d2));
+    s.pdf = ONE;
+    s.infinite = NO_LANES;
+    s.delta = ALL_LANES;
+    return s;
+}
+
 #if LIGHT_RANGES
 // Attenuation by a light's range at the squared distance d2: 1 − (d/range)⁴, 0 beyond (KHR_lights_punctual).
 static inline real within_range(real d2, real per_range2) {

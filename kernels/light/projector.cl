@@ -5,11 +5,9 @@
 #include "light/image.cl"
 
 static inline LightSample projector_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
-    LightSample s;
-    s.target = GATHER3(scene->projector_lights, index, .position);
-    real3 d = sub(s.target, p);
-    real d2 = dot3(d, d), inverse = rsqrt(d2);
-    s.wi = scale(d, inverse);
+    real d2;
+    LightSample s = sample_of_point(GATHER3(scene->projector_lights, index, .position), p, &d2);
+    real inverse = rsqrt(d2);
     real3 away = scale(s.wi, -ONE);
     real ahead = dot3(away, GATHER3(scene->projector_lights, index, .axis));
     real2 at = on_image_plane(away, ahead, GATHER3(scene->projector_lights, index, .across),
@@ -24,8 +22,5 @@ static inline LightSample projector_light_sample(const Scene *scene, ireal index
 #if LIGHT_RANGES
     s.radiance = scale(s.radiance, within_range(d2, GATHER(real, scene->projector_lights, index, .per_range2)));
 #endif
-    s.pdf = ONE;
-    s.infinite = NO_LANES;
-    s.delta = ALL_LANES;
     return s;
 }

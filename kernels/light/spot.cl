@@ -2,11 +2,9 @@
 #include "light/cone.cl"
 
 static inline LightSample spot_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
-    LightSample s;
-    s.target = GATHER3(scene->spot_lights, index, .position);
-    real3 d = sub(s.target, p);
-    real d2 = dot3(d, d), inverse = rsqrt(d2);
-    s.wi = scale(d, inverse);
+    real d2;
+    LightSample s = sample_of_point(GATHER3(scene->spot_lights, index, .position), p, &d2);
+    real inverse = rsqrt(d2);
     real f = cone_factor(s.wi, GATHER3(scene->spot_lights, index, .axis),
                          GATHER(real, scene->spot_lights, index, .outer),
                          GATHER(real, scene->spot_lights, index, .slope)) * inverse;
@@ -14,8 +12,5 @@ static inline LightSample spot_light_sample(const Scene *scene, ireal index, rea
 #if LIGHT_RANGES
     s.radiance = scale(s.radiance, within_range(d2, GATHER(real, scene->spot_lights, index, .per_range2)));
 #endif
-    s.pdf = ONE;
-    s.infinite = NO_LANES;
-    s.delta = ALL_LANES;
     return s;
 }

@@ -3,11 +3,10 @@
 #include "light/image.cl"
 
 static inline LightSample spot_image_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
-    LightSample s;
-    s.target = GATHER3(scene->spot_image_lights, index, .position);
-    real3 d = sub(s.target, p), axis = GATHER3(scene->spot_image_lights, index, .axis);
-    real d2 = dot3(d, d), inverse = rsqrt(d2);
-    s.wi = scale(d, inverse);
+    real d2;
+    LightSample s = sample_of_point(GATHER3(scene->spot_image_lights, index, .position), p, &d2);
+    real3 axis = GATHER3(scene->spot_image_lights, index, .axis);
+    real inverse = rsqrt(d2);
     real f = cone_factor(s.wi, axis, GATHER(real, scene->spot_image_lights, index, .outer),
                          GATHER(real, scene->spot_image_lights, index, .slope)) * inverse;
     real3 away = scale(s.wi, -ONE);
@@ -19,8 +18,5 @@ static inline LightSample spot_image_light_sample(const Scene *scene, ireal inde
 #if LIGHT_RANGES
     s.radiance = scale(s.radiance, within_range(d2, GATHER(real, scene->spot_image_lights, index, .per_range2)));
 #endif
-    s.pdf = ONE;
-    s.infinite = NO_LANES;
-    s.delta = ALL_LANES;
     return s;
 }

@@ -63,7 +63,7 @@ static inline real at_place(global const float *function, real2 place) {
     return fma((real)(function[0]), place.x, fma((real)(function[1]), place.y, (real)(function[2])));
 }
 
-static inline void meet_triangle(global const Outline *outline, Row *row) {
+static inline void rasterize_triangle(global const Outline *outline, Row *row) {
     real edge0 = at_place(outline->edge0, row->place), edge1 = at_place(outline->edge1, row->place);
     real edge2 = at_place(outline->edge2, row->place), nearness = at_place(outline->nearness, row->place);
     ireal inside = minimum(minimum(edge0, edge1), minimum(edge2, nearness - row->nearness)) >= 0.0f;
@@ -84,20 +84,20 @@ static inline void meet_triangle(global const Outline *outline, Row *row) {
 #if SPHERES
 SPHERE_OF(real, ireal, TwiceSeen, seen)
 
-static inline void meet_sphere(global const Outline *outline, Row *row) {
+static inline void rasterize_sphere(global const Outline *outline, Row *row) {
     const real origin[3] = {row->ray.origin.x, row->ray.origin.y, row->ray.origin.z};
     const real direction[3] = {row->ray.direction.x, row->ray.direction.y, row->ray.direction.z};
     const real from[3] = {origin[0] - outline->edge0[0], origin[1] - outline->edge0[1], origin[2] - outline->edge0[2]};
-    ireal meets = row->active & seen_may_meet(from, direction, outline->edge1[0]);
-    if (!ANY(meets)) return;
+    ireal hit = row->active & seen_may_hit(from, direction, outline->edge1[0]);
+    if (!ANY(hit)) return;
     real near, far;
     seen_roots(origin, direction, outline->edge0, outline->edge1[0], &near, &far);
     real t = near > 0.0f ? near : far, nearness = row->length / t;
-    meets = meets & is_first(row, nearness, outline->primitive, 0);
-    row->nearness = meets ? nearness : row->nearness;
-    row->t = meets ? t : row->t;
-    row->primitive = meets ? (ireal)(outline->primitive) : row->primitive;
-    row->instance = meets ? (ireal)(0) : row->instance;
+    hit = hit & is_first(row, nearness, outline->primitive, 0);
+    row->nearness = hit ? nearness : row->nearness;
+    row->t = hit ? t : row->t;
+    row->primitive = hit ? (ireal)(outline->primitive) : row->primitive;
+    row->instance = hit ? (ireal)(0) : row->instance;
 }
 #endif
 
@@ -115,12 +115,12 @@ static inline void rasterise(const Bins *bins, const Launch *launch, uint x, uin
             int last = below / ROW_HEIGHT < count ? below / ROW_HEIGHT : count - 1;
             for (int row = above > 0 ? above / ROW_HEIGHT : 0; row <= last; ++row) {
 #if TRIANGLES && SPHERES
-                if (outline->instance >= 0) meet_triangle(outline, rows + row);
-                else meet_sphere(outline, rows + row);
+                if (outline->instance >= 0) rasterize_triangle(outline, rows + row);
+                else rasterize_sphere(outline, rows + row);
 #elif TRIANGLES
-                meet_triangle(outline, rows + row);
+                rasterize_triangle(outline, rows + row);
 #else
-                meet_sphere(outline, rows + row);
+                rasterize_sphere(outline, rows + row);
 #endif
             }
         }

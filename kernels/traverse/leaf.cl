@@ -103,7 +103,7 @@ SPHERE_OF(float, int, Twice, sphere)
 static inline bool intersect_sphere(const Ray *ray, global const LeafSphere *sphere, float t_min, float t_max, float *t) {
     const float f[3] = {ray->origin[0] - sphere->center[0], ray->origin[1] - sphere->center[1],
                         ray->origin[2] - sphere->center[2]};
-    if (!sphere_may_meet(f, ray->direction, sphere->radius)) return false;
+    if (!sphere_may_hit(f, ray->direction, sphere->radius)) return false;
     float near, far;
     sphere_roots(ray->origin, ray->direction, sphere->center, sphere->radius, &near, &far);
     *t = near > t_min ? near : far;

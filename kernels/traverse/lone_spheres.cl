@@ -16,21 +16,21 @@ static inline ireal is_ahead(real t, int primitive, const Hits *after) {
 }
 
 // The closest sphere hits of enabled lanes nearer than t_max (see next_hit); on a miss t_max and no primitive.
-static inline Hits meet_spheres(const Scene *scene, real3 origin, real3 direction, real t_max, ireal enabled,
+static inline Hits intersect_lone_spheres(const Scene *scene, real3 origin, real3 direction, real t_max, ireal enabled,
                                 const Hits *after) {
     Hits hits = {t_max, ZERO, ZERO, (ireal)(-1), (ireal)(0)};
     const real o[3] = {origin.x, origin.y, origin.z}, d[3] = {direction.x, direction.y, direction.z};
     for (int i = 0; i < scene->counts.spheres; ++i) {
         global const LeafSphere *sphere = RECORD(scene->leaf_spheres, i);
         const real f[3] = {o[0] - sphere->center[0], o[1] - sphere->center[1], o[2] - sphere->center[2]};
-        ireal meets = enabled ? lone_may_meet(f, d, sphere->radius) : NO_LANES;   // inactive lanes hold no rays
-        if (!ANY(meets)) continue;
+        ireal hit = enabled ? lone_may_hit(f, d, sphere->radius) : NO_LANES;   // inactive lanes hold no rays
+        if (!ANY(hit)) continue;
         real near, far;
         lone_roots(o, d, sphere->center, sphere->radius, &near, &far);
         real t = is_ahead(near, sphere->primitive, after) ? near : far;
-        meets = meets ? is_ahead(t, sphere->primitive, after) & (t < hits.t) : NO_LANES;   // at equal t the first stays
-        hits.t = meets ? t : hits.t;
-        hits.primitive = meets ? (ireal)(sphere->primitive) : hits.primitive;
+        hit = hit ? is_ahead(t, sphere->primitive, after) & (t < hits.t) : NO_LANES;   // at equal t the first stays
+        hits.t = hit ? t : hits.t;
+        hits.primitive = hit ? (ireal)(sphere->primitive) : hits.primitive;
     }
     return hits;
 }

@@ -10,7 +10,7 @@ typedef struct {
 } TreeRays;
 
 #if TRIANGLES
-static inline ireal meets_box(const SlabRays *rays, real3 origin, global const Triangles *pack, real t_max) {
+static inline ireal hits_box(const SlabRays *rays, real3 origin, global const Triangles *pack, real t_max) {
     real t_near = ZERO, t_far = t_max;
 #define PACK_SLABS(axis, o) { \
         real lo = pack->lo[axis] - o, hi = pack->hi[axis] - o; \
@@ -31,12 +31,12 @@ static inline ireal choose_packs(const Scene *scene, real3 origin, real3 directi
     SlabRays slabs = slab_rays(direction);
     ireal chosen = (ireal)(INT_MIN);   // the last bit
     for (int i = 0; i < count && i < LAST_BIT; ++i)
-        chosen |= meets_box(&slabs, origin, RECORD(scene->packs, i), t_max) ? (ireal)(1 << i) : (ireal)(0);
+        chosen |= hits_box(&slabs, origin, RECORD(scene->packs, i), t_max) ? (ireal)(1 << i) : (ireal)(0);
     return chosen;
 }
 
 // Rarely called.
-__attribute__((noinline)) static Hit meet_packs_exactly(const LeafRay *leaf, ARRAY(Triangles) packs,
+__attribute__((noinline)) static Hit intersect_packs_exactly(const LeafRay *leaf, ARRAY(Triangles) packs,
                                                         const bool stop_at_first, Hit hit) {
     for (int i = 0; i < RECORD(packs, 0)->count * HALVES && !(stop_at_first && hit.primitive >= 0); ++i)
         hit_triangles(leaf, pack_at(packs, i), stop_at_first, &hit);
@@ -62,8 +62,8 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
 #if TRIANGLES
     uint chosen = (uint)LANE_INT(rays->chosen, lane);
     for (int i = 0; i < RECORD(scene->packs, 0)->count; ++i) if (is_chosen(chosen, i)) VISIT(tests, i);
-    if (!meet_packs(&leaf.triangle_ray, ray, scene->packs, chosen, stop_at_first, &hit))
-        hit = meet_packs_exactly(&leaf, scene->packs, stop_at_first, *nearest);
+    if (!intersect_packs(&leaf.triangle_ray, ray, scene->packs, chosen, stop_at_first, &hit))
+        hit = intersect_packs_exactly(&leaf, scene->packs, stop_at_first, *nearest);
 #endif
 #if LEAF_SPHERES
     for (int i = 0; i < scene->counts.spheres && !(stop_at_first && hit.primitive >= 0); ++i)

@@ -58,7 +58,7 @@ static inline Hits next_hit(const Scene *scene, real3 origin, real3 direction, r
 #if PRIMITIVES
     ireal enabled = active & is_ray(origin, direction);
 #if LONE_SPHERES
-    hits = meet_spheres(scene, origin, direction, t_max, enabled, after);
+    hits = intersect_lone_spheres(scene, origin, direction, t_max, enabled, after);
 #else
     hits.t = t_max;
 #endif
@@ -112,7 +112,7 @@ static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, r
     ireal enabled = active & is_ray(origin, direction);
 #if LONE_SPHERES
     const Hits none = NO_HIT;
-    blocked = meet_spheres(scene, origin, direction, t_max, enabled, &none).primitive >= 0;
+    blocked = intersect_lone_spheres(scene, origin, direction, t_max, enabled, &none).primitive >= 0;
     enabled = enabled & !blocked;
 #endif
 #if IN_TREE

@@ -121,7 +121,7 @@ def test_camera_rays_go_through_the_pixels_row_by_row() -> None:
     np.testing.assert_allclose(np.diff(slopes[..., 0], axis=1), 2 * np.tan(np.radians(22.5)) / 40, rtol=1e-3)
 
 
-def test_surface_points_are_where_rays_meet_planes(device: Device) -> None:
+def test_surface_points_are_where_rays_hit_planes(device: Device) -> None:
     """Points agree with ray–plane intersections in float64; normals face the ray origins; misses are excluded."""
     vertices, faces = icosphere(3)
     origins = RNG.uniform(-1.5, 1.5, (4000, 3)).astype(np.float32)

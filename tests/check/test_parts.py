@@ -84,7 +84,7 @@ def test_rays_of_both_kinds_agree() -> None:
     """Rays from the origin, whose hits are known by construction, agree with exact tests of all triangles."""
     surface = star.make_star()
     inside = star.rays_from_inside(surface).take(slice(6, 700, 7))
-    t, least, _ = star.meet_planes(surface, np.zeros_like(inside.corners), inside.directions.astype(np.int64))
+    t, least, _ = star.intersect_planes(surface, np.zeros_like(inside.corners), inside.directions.astype(np.int64))
     hit = (t > 0) & (least > 0)
     assert np.all(hit.sum(axis=1) == 1)
     assert np.array_equal(surface.faces[hit.argmax(axis=1)], inside.corners)

@@ -236,7 +236,7 @@ def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], co
 
 def test_print_kernel_prints_what_the_scene_needs(scene: Path) -> None:
     source = clrt("render", scene, "--print-kernel", cwd=scene.parent).stdout
-    assert "closest_hit(" in source and "diffuse_eval" in source and "meet_spheres" in source
+    assert "closest_hit(" in source and "diffuse_eval" in source and "intersect_lone_spheres" in source
     assert "mirror_eval" not in source and "intersect_triangles(const" not in source and "sky_texels" not in source
 
 

@@ -85,7 +85,7 @@ def test_a_scene_is_made_of_meshes_and_scenes() -> None:
         clrt.Scene(meshes=[trimesh.creation.box(), trimesh.Trimesh()])  # type: ignore[list-item]
 
 
-def test_rays_meet_all_meshes_of_a_scene() -> None:
+def test_rays_hit_all_meshes_of_a_scene() -> None:
     made = scene()
     origins, down = np.array([[0, 0, 9], [3, 0, 9], [0, 0, 9], [8, 8, 9]], float), np.array([0, 0, -1.0])
     given: Any = made

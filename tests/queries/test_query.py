@@ -115,7 +115,7 @@ def test_all_hits_are_those_of_brute_force(soup: clrt.RayQuery) -> None:
     assert (np.diff(hits["t"])[np.diff(index) == 0] >= 0).all()
 
 
-def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
+def test_coherent_rays_hit_the_same_by_all_traversals(device: Device) -> None:
     """A fan from one point and parallel rays, with single divergent rays, agree bit for bit across traversals."""
     y, x = np.mgrid[-1:1:90j, -1:1:91j].reshape(2, -1)
     fan = np.stack([x, y, np.full(len(x), -1.5)], axis=1)
@@ -174,7 +174,7 @@ def test_size_does_not_matter(device: Device, scale: float) -> None:
     np.testing.assert_allclose(hits["t"], base["t"] * size, rtol=1e-6)
 
 
-def test_strange_rays_meet_nothing(soup: clrt.RayQuery) -> None:
+def test_strange_rays_hit_nothing(soup: clrt.RayQuery) -> None:
     strange: list[Any] = [[0, 0, 0], [np.nan, 0, 1], [np.inf, 0, 1], [-np.inf] * 3]
     assert not soup.any_hit([0.0, 0.0, 0.0], strange).any()
     assert not soup.any_hit(np.array(strange[1:]), [0.0, 0.0, 1.0]).any()

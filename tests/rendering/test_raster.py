@@ -147,7 +147,7 @@ def test_of_equals_the_first_is_seen(device: Device) -> None:
     ],
     ids=["few", "around the eye", "ground", "far and beside", "many"],
 )
-def test_spheres_are_seen_as_rays_meet_them(device: Device, spheres: list[Sphere]) -> None:
+def test_spheres_are_seen_as_rays_hit_them(device: Device, spheres: list[Sphere]) -> None:
     """The same test of the same ray is used: results are equal except for the side of a silhouette."""
     scene = Scene(spheres=spheres, meshes=[soup(20, 4)], camera=AHEAD, render=replace(SETTINGS, size=(128, 96)))
     for each in (scene, replace(scene, meshes=[])):

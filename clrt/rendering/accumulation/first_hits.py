@@ -154,6 +154,6 @@ def ranked(hits: NDArray[np.int64], ids: NDArray[np.float32]) -> NDArray[np.floa
 
 def _ids(session: Accumulation, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:
     """Return the ids at first hits: the scene's object, its primitive, and its material."""
-    place, primitive = session.compiled.objects.met(seen["primitive"], seen["instance"])
+    place, primitive = session.compiled.objects.at_hits(seen["primitive"], seen["instance"])
     which, materials = np.array([*numbers_of(scene), -1])[place], np.array([*materials_of(scene)[1], -1])
     return {"primitive": primitive, "object": which, "material": materials[which]}

@@ -115,7 +115,7 @@ class ObjectIds:
     meshes: Sequence[int]
     instances: Sequence[int]
 
-    def met(self, primitive: NDArray[np.int32], instance: NDArray[np.int32]) -> tuple[IntArray, IntArray]:
+    def at_hits(self, primitive: NDArray[np.int32], instance: NDArray[np.int32]) -> tuple[IntArray, IntArray]:
         """Return the object and its triangle at hits as stored by the kernels, both of the same shape; −1 at misses."""
         counts = np.array([*self.faces, *[1] * self.spheres], np.int64)
         starts, rest = np.cumsum(counts) - counts, len(counts)
