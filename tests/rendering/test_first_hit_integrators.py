@@ -39,7 +39,7 @@ def ball(integrator: Integrator, camera: Camera, spp: int = 4, unit: float = 1.0
     )
 
 
-def at_hits(origin: Doubles, w: Doubles) -> Doubles:
+def met(origin: Doubles, w: Doubles) -> Doubles:
     """Return the distance to the sphere along unit directions (n, 3), NaN for a miss, (n,)."""
     d = np.array(BALL) - origin
     along = np.sum(d * w, axis=-1)
