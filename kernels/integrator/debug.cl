@@ -78,7 +78,7 @@ static inline Hits blocker_of(const Scene *scene, const ShadowRay *ray, ireal st
         Surface surface = surface_at(scene, ray->origin, direction, &hits);
         ireal passes = stopped & (hits.primitive >= 0) & (opacity_at(scene, &surface, direction, false) < 1.0f);
         if (!ANY(passes)) break;
-        Hits next = next_hit(scene, ray->origin, direction, t_max, passes, &hits);
+        Hits next = next_hit(scene, ray->origin, direction, t_max, passes, &hits, SEARCH_CLOSEST);
         hits = choose_hits(passes, &next, &hits);
     }
 #endif

@@ -48,7 +48,7 @@ static inline real transmittance(const Scene *scene, real3 origin, ireal light, 
         hits = next_hit(scene, origin, direction, t_max, passes, &hits, SEARCH_OPAQUE);
         ireal hit = passes & (hits.primitive >= 0);
         passes = hit & may_pass(scene, &hits, false);
-        left = hit & !passes ? ZERO : left;
+        left = (hit & !passes) ? ZERO : left;
         if (!ANY(passes)) return left;
         Surface surface = surface_at(scene, origin, direction, &hits);
         passes = passes & (surface.light != light);
