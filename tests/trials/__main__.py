@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
 from importlib import import_module
@@ -24,6 +25,8 @@ NAMES = (
     "sky",
 )
 
+# Renders that are started in the background of a shell would ignore the interrupts that trials send them.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 for name in sys.argv[1:] or NAMES:
     if name not in NAMES:
         sys.exit(f"no trial {name!r}; there are {', '.join(NAMES)}")
