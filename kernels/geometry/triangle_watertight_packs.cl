@@ -39,7 +39,7 @@ static inline wide_mask comes_next(const Ray *ray, global const Triangles *leaf,
 
 // Find the closest hit, or any, in the chosen packs. Return false if that is undecided.
 static inline bool intersect_packs(const TriangleRay *ray, const Ray *whole, ARRAY(Triangles) packs, uint chosen,
-                              const bool stop_at_first, Hit *hit) {
+                                   const bool stop_at_first, Hit *hit) {
     // As in intersect_sheared, with reach <= 2 far and depth <= far.
     float far = RECORD(packs, 0)->extent + fabs(ray->ox) + fabs(ray->oy) + fabs(ray->oz);
     float error = T_ERROR * 6.0f * far * far, rounding = error * far * fabs(ray->sz), thin = error / THIN;

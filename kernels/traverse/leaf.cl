@@ -1,4 +1,4 @@
-// Leaf intersection; BVH traversal uses only the two functions of this file.
+// Leaf intersection, and where the search for a hit ends: all that BVH traversal uses of primitives.
 //
 // Of several hits at the same t the lowest primitive wins (of the lowest instance), so the result does not depend on
 // the BVH. `search` and `stop_at_first` are compile-time constants at every call, see traverse/trace.cl.
@@ -63,6 +63,7 @@ static inline void keep_closest(const LeafRay *ray, Hit *hit, float t, float u, 
         *hit = HIT(ray, t, u, v, primitive);
 }
 
+// Whether the search ends with the closest hit so far, after a leaf was intersected.
 static inline bool ends_search(const Scene *scene, const int search, const Hit *hit) {
 #if OPACITY
     if (search == SEARCH_OPAQUE && hit->primitive >= 0) {

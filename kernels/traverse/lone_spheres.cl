@@ -17,7 +17,7 @@ static inline ireal is_ahead(real t, int primitive, const Hits *after) {
 
 // The closest sphere hits of enabled lanes nearer than t_max (see next_hit); on a miss t_max and no primitive.
 static inline Hits intersect_lone_spheres(const Scene *scene, real3 origin, real3 direction, real t_max, ireal enabled,
-                                const Hits *after) {
+                                          const Hits *after) {
     Hits hits = {t_max, ZERO, ZERO, (ireal)(-1), (ireal)(0)};
     const real o[3] = {origin.x, origin.y, origin.z}, d[3] = {direction.x, direction.y, direction.z};
     for (int i = 0; i < scene->counts.spheres; ++i) {

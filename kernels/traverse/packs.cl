@@ -37,7 +37,7 @@ static inline ireal choose_packs(const Scene *scene, real3 origin, real3 directi
 
 // Rarely called.
 __attribute__((noinline)) static Hit intersect_packs_exactly(const LeafRay *leaf, ARRAY(Triangles) packs,
-                                                        const bool stop_at_first, Hit hit) {
+                                                             const bool stop_at_first, Hit hit) {
     for (int i = 0; i < RECORD(packs, 0)->count * HALVES && !(stop_at_first && hit.primitive >= 0); ++i)
         hit_triangles(leaf, pack_at(packs, i), stop_at_first, &hit);
     return hit;

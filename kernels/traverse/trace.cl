@@ -51,7 +51,7 @@ static inline ireal is_ray(real3 origin, real3 direction) {
 }
 
 // The closest hit of each active lane's ray with 0 < t < t_max; if NEXT_HIT the first one after `after`, in the order
-// of (t, instance, primitive). search: where it may end (traverse/leaf.cl).
+// of (t, instance, primitive). search: where it may end, see above.
 static inline Hits next_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active,
                             const Hits *after, const int search) {
     Hits hits = {(real)(INFINITY), ZERO, ZERO, (ireal)(-1), (ireal)(0)};
