@@ -18,7 +18,7 @@ from clrt.output.images import read_image
 from clrt.rendering.checkpoint.checkpoint_file import older, read_checkpoint
 from clrt.rendering.checkpoint.saved_state import KINDS
 
-from .test_commands import clrt
+from .test_commands import RUNS, Run, clrt
 
 #: A point light and a constant environment between two spheres.
 SCENE = """
@@ -163,6 +163,7 @@ def test_a_full_disk_ends_no_render(folder: Path) -> None:
     assert not list(folder.glob("*.new")) and not list(folder.glob(".clrt*"))
 
 
+@pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize(
     ("options", "code", "words"),
     [
@@ -175,11 +176,11 @@ def test_a_full_disk_ends_no_render(folder: Path) -> None:
     ],
 )
 def test_mistakes_end_in_one_message(
-    folder: Path, content: bytes, options: tuple[Any, ...], code: int, words: list[str]
+    folder: Path, content: bytes, run: Run, options: tuple[Any, ...], code: int, words: list[str]
 ) -> None:
     (folder / "a.ck").write_bytes(content)
     (folder / "b.ck").write_text("something else")
-    result = clrt("render", "ball.toml", "--spp", "1", *options, cwd=folder)
+    result = run("render", "ball.toml", "--spp", "1", *options, cwd=folder)
     assert result.returncode == code and result.stdout == "" and "Traceback" not in result.stderr
     assert all(word in result.stderr for word in words), result.stderr
     assert (folder / "a.ck").read_bytes() == content and not older(folder / "a.ck").exists()

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from clrt.cli import main
+from clrt.device.launches.hang_watchdog import VARIABLE
 from clrt.output.images import read_image
+
+from ..covering import others
 
 SCENE = """
 [camera]
@@ -61,6 +68,24 @@ BVH_FIELDS = {"triangles", "spheres", "instances", "nodes", "bytes", "build_seco
 
 def clrt(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-m", "clrt", *map(str, arguments)], cwd=cwd, capture_output=True, text=True)
+
+
+def called(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Return what `clrt` says and returns, without a process of its own, whose start takes longer than a mistake, and
+    without the watchdog, which would fork this one."""
+    outputs = [io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2)]
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(outputs[0]), redirect_stderr(outputs[1]):
+        patch.setenv(VARIABLE, "0")
+        patch.chdir(cwd)
+        with pytest.raises(SystemExit) as ended:
+            main([*map(str, arguments)])
+    said, told = (output.buffer.getvalue().decode() for output in outputs)  # type: ignore[attr-defined]
+    assert isinstance(ended.value.code, int)
+    return subprocess.CompletedProcess(arguments, ended.value.code, said, told)
+
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
+RUNS = [called, *others(clrt)]
 
 
 @pytest.fixture
@@ -199,6 +224,7 @@ file = "nowhere.ply"
     assert not list(tmp_path.glob("*.png"))
 
 
+@pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
@@ -225,10 +251,12 @@ file = "nowhere.ply"
         (("bench", "raiz"), 2, ['command "raiz" is unknown; write one of agree,']),
     ],
 )
-def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], code: int, words: list[str]) -> None:
+def test_mistakes_end_in_one_message(
+    scene: Path, run: Run, arguments: tuple[str, ...], code: int, words: list[str]
+) -> None:
     scene.with_name("loop.toml").symlink_to("loop.toml")
     scene.with_name("x.png").touch()
-    result = clrt(*arguments, cwd=scene.parent)
+    result = run(*arguments, cwd=scene.parent)
     assert result.returncode == code and result.stdout == ""
     assert "Traceback" not in result.stderr and all(word in result.stderr for word in words), result.stderr
     assert "leaked" not in result.stderr  # OpenImageIO reports objects leaked at exit
@@ -329,7 +357,7 @@ def test_a_scene_without_light_says_so(tmp_path: Path) -> None:
     assert clrt("render", "dark.toml", "-q", cwd=tmp_path).stderr == ""
 
 
-@pytest.mark.parametrize("size", [(64, 48), (30, 80)])
+@pytest.mark.parametrize("size", [(64, 48), *others(((30, 80),))])
 def test_convert_in_a_size(size: tuple[int, int], tmp_path: Path) -> None:
     """The scene file has the size, and the camera that frames the model in it; at the default size it has another."""
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 4 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\n")

@@ -17,7 +17,7 @@ from clrt.output.images import write_image
 from clrt.output.scenes import save_scene
 
 from .test_checkpoints import SCENE
-from .test_commands import clrt
+from .test_commands import RUNS, Run, clrt
 
 
 @pytest.fixture
@@ -27,6 +27,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -38,11 +39,11 @@ def folder(tmp_path: Path) -> Path:
     ],
     ids=" ".join,
 )
-def test_pipes_are_no_targets(folder: Path, arguments: tuple[str, ...]) -> None:
+def test_pipes_are_no_targets(folder: Path, run: Run, arguments: tuple[str, ...]) -> None:
     pipe = folder / next(argument for argument in arguments if argument.startswith("pipe"))
     os.mkfifo(pipe)
     before = sorted(folder.iterdir())
-    result = clrt(*arguments, cwd=folder)
+    result = run(*arguments, cwd=folder)
     assert (result.returncode, result.stdout, result.stderr.count(f"{pipe.name}: is a device, a pipe")) == (6, "", 1)
     assert stat.S_ISFIFO(os.lstat(pipe).st_mode) and sorted(folder.iterdir()) == before
 
@@ -103,6 +104,7 @@ def test_what_cannot_be_replaced_loses_nothing(
     assert path.read_text() == ("new" if replaced else "old")
 
 
+@pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize(
     "options",
     [
@@ -120,11 +122,11 @@ def test_what_cannot_be_replaced_loses_nothing(
     ],
     ids=" ".join,
 )
-def test_no_file_is_named_twice(folder: Path, options: tuple[str, ...]) -> None:
+def test_no_file_is_named_twice(folder: Path, run: Run, options: tuple[str, ...]) -> None:
     (folder / "r.exr").write_text("a reference")
     (folder / "ball").write_text("somebody's file")
     before = {path: path.read_bytes() for path in folder.iterdir()}
-    result = clrt("render", "ball.toml", "-o", "w.exr", *options, cwd=folder)
+    result = run("render", "ball.toml", "-o", "w.exr", *options, cwd=folder)
     code = 3 if "ball" in options else 2
     assert result.returncode == code and result.stdout == "" and "Traceback" not in result.stderr, result.stderr
     said = f"{Path(options[-1])}: {'is' if code == 2 else 'exists and is not a checkpoint'}".replace("####", "0000")
@@ -135,6 +137,7 @@ def test_no_file_is_named_twice(folder: Path, options: tuple[str, ...]) -> None:
 MODEL = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 
 
+@pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -147,7 +150,7 @@ MODEL = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0
     ],
     ids=" ".join,
 )
-def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ...]) -> None:
+def test_no_file_of_the_scene_is_replaced(folder: Path, run: Run, arguments: tuple[str, ...]) -> None:
     """Scene files (models, .mtl, textures, maps) are checked before the render; a.obj's default output is a texture."""
     (folder / "a.obj").write_text(MODEL)
     (folder / "a.mtl").write_text("newmtl m\nmap_Kd a.png\n")
@@ -162,7 +165,7 @@ def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ..
     for name in ("a.png", "paint.png", "t_0001.png", "sky.hdr"):
         write_image(folder / name, np.ones((4, 8, 3), np.float32))
     before = {path: path.read_bytes() for path in folder.iterdir()}
-    result = clrt("render", *arguments, "--spp", "1", cwd=folder)
+    result = run("render", *arguments, "--spp", "1", cwd=folder)
     assert (result.returncode, result.stdout) == (2, "") and "is both a file of the scene and" in result.stderr
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 

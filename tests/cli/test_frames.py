@@ -23,6 +23,7 @@ from clrt.output.video import write_video
 from clrt.scene.camera_path import frames
 
 from ..formats.test_gltf_animations import animated
+from .test_commands import RUNS, Run, called
 
 FLIGHT = """
 camera = { fov_degrees = 50 }
@@ -224,6 +225,7 @@ def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> 
     assert done.stdout.split() == ["0002.png", "0003.png", "0004.png", "0005.png", "f.gif"], done.stderr
 
 
+@pytest.mark.parametrize("run", RUNS)
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
@@ -244,19 +246,15 @@ def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> 
         (["--frames", "0", "-o", "no/a.png"], 6, "does not exist"),
     ],
 )
-def test_mistakes_end_in_one_message(arguments: list[str], code: int, words: str, flight: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "clrt", "render", "flight.toml", *arguments], capture_output=True, text=True
-    )
+def test_mistakes_end_in_one_message(run: Run, arguments: list[str], code: int, words: str, flight: Path) -> None:
+    done = run("render", "flight.toml", *arguments, cwd=flight.parent)
     assert done.returncode == code and words in done.stderr and "Traceback" not in done.stderr
     assert not done.stdout and [path.name for path in Path().iterdir()] == ["flight.toml"]
 
 
 def test_what_does_not_move_has_no_frames(flight: Path) -> None:
     flight.write_text("sphere = [{}]\n")
-    done = subprocess.run(
-        [sys.executable, "-m", "clrt", "render", "flight.toml", "--frames", "all"], capture_output=True, text=True
-    )
+    done = called("render", "flight.toml", "--frames", "all", cwd=flight.parent)
     assert done.returncode == 3 and "flight: has no animation; write [[keyframe]]" in done.stderr
 
 
