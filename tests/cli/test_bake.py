@@ -52,6 +52,7 @@ def test_it_writes_images_and_a_report(folder: Path) -> None:
     assert last.startswith("100 %") and f"standard error {report['standard_error']:.3g}" in last
 
 
+@pytest.mark.programs
 def test_occlusion_in_a_png_is_linear(folder: Path) -> None:
     result = clrt(
         *("bake", "room.toml", "--mesh", "floor", "--what", "occlusion", "--size", "8", "--spp", "64"),

@@ -18,6 +18,7 @@ from clrt.output.images import read_image
 from clrt.rendering.checkpoint.checkpoint_file import older, read_checkpoint
 from clrt.rendering.checkpoint.saved_state import KINDS
 
+from ..covering import others
 from .test_commands import RUNS, Run, clrt
 
 #: A point light and a constant environment between two spheres.
@@ -119,7 +120,7 @@ def test_killed_at_any_moment_it_ends_as_if_it_were_not(folder: Path, kills: int
     assert read_image(folder / "a.exr").tobytes() == read_image(left_alone / "a.exr").tobytes()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, *others(signal.SIGTERM, signal.SIGHUP)])
 def test_the_first_signal_keeps_everything(folder: Path, number: signal.Signals) -> None:
     process = started("--time", "600", "--report", "r.json", cwd=folder)
     time.sleep(0.2)
@@ -147,6 +148,7 @@ def test_the_second_signal_ends_it_now(folder: Path) -> None:
     assert not (folder / "a.exr").exists() and not (folder / "a.ck.new").exists()
 
 
+@pytest.mark.processes
 def test_a_full_disk_ends_no_render(folder: Path) -> None:
     """File sizes are limited during the render: there is one warning, the previous checkpoint stays intact, and images
     that do not fit do not prevent others from being written."""

@@ -338,17 +338,16 @@ def test_bench_rays_counts_the_hits_of_a_file(tmp_path: Path) -> None:
     assert failed.returncode == 3 and "no.npz" in failed.stderr and "Traceback" not in failed.stderr
 
 
-def test_error_is_reached_and_not_far_passed(scene: Path) -> None:
+@pytest.mark.parametrize(
+    ("error", "sampler", "least"),
+    [(0.02, "sobol", 0.5), *others((0.035, "independent", 0.85), (0.02, "independent", 0.85))],
+)
+def test_error_is_reached_and_not_far_passed(scene: Path, error: float, sampler: str, least: float) -> None:
     """With Sobol' samples the error falls in steps, by a factor of up to 2 at powers of two."""
     scene.write_text(SCENE + '[[light]]\ntype = "point"\nposition = [0, 3, 1]\nintensity = [20, 20, 20]\n')
-    for error, sampler, least in ((0.035, "independent", 0.85), (0.02, "independent", 0.85), (0.02, "sobol", 0.5)):
-        assert (
-            clrt(
-                "render", scene, "--error", error, "--sampler", sampler, "--report", "e.json", cwd=scene.parent
-            ).returncode
-            == 0
-        )
-        assert least * error < json.loads((scene.parent / "e.json").read_text())["noise"] <= error
+    asked = ("--error", error, "--sampler", sampler, "--report", "e.json")
+    assert clrt("render", scene, *asked, cwd=scene.parent).returncode == 0
+    assert least * error < json.loads((scene.parent / "e.json").read_text())["noise"] <= error
 
 
 def test_a_scene_without_light_says_so(tmp_path: Path) -> None:
@@ -362,10 +361,10 @@ def test_convert_in_a_size(size: tuple[int, int], tmp_path: Path) -> None:
     """The scene file has the size, and the camera that frames the model in it; at the default size it has another."""
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 4 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 4 2\n")
     asked = "--size", f"{size[0]}x{size[1]}"
-    assert clrt("convert", "a.obj", "a.toml", *asked, cwd=tmp_path).returncode == 0
-    assert clrt("convert", "a.obj", "square.toml", cwd=tmp_path).returncode == 0
+    assert called("convert", "a.obj", "a.toml", *asked, cwd=tmp_path).returncode == 0
+    assert called("convert", "a.obj", "square.toml", cwd=tmp_path).returncode == 0
     for name, *options in (("a.obj", *asked), ("a.toml",), ("square.toml", *asked)):
-        done = clrt("render", name, *options, "-o", f"{name}.exr", "--spp", "2", cwd=tmp_path)
+        done = called("render", name, *options, "-o", f"{name}.exr", "--spp", "2", cwd=tmp_path)
         assert done.returncode == 0, done.stderr
     expected, found, other = (read_image(tmp_path / f"{name}.exr") for name in ("a.obj", "a.toml", "square.toml"))
     assert expected.shape[:2] == size[::-1]
@@ -383,16 +382,16 @@ def test_convert(tmp_path: Path) -> None:
     assert 'file = "../models/a.obj"' in (tmp_path / "scenes" / "a.toml").read_text()
     for name in ("models/a.obj", "scenes/a.toml"):
         assert (
-            clrt(
+            called(
                 "render", name, "-o", f"{Path(name).suffix[1:]}.exr", "--size", "16x16", "--spp", "4", cwd=tmp_path
             ).returncode
             == 0
         )
     np.testing.assert_array_equal(read_image(tmp_path / "obj.exr"), read_image(tmp_path / "toml.exr"))
-    done = clrt("convert", "models/a.obj", "scenes/a.toml", cwd=tmp_path)
+    done = called("convert", "models/a.obj", "scenes/a.toml", cwd=tmp_path)
     assert done.returncode == 2 and "already exists" in done.stderr and "--force" in done.stderr
-    assert clrt("convert", "models/a.obj", "scenes/a.toml", "--force", cwd=tmp_path).returncode == 0
-    assert clrt("convert", "scenes/a.toml", "b.toml", cwd=tmp_path).returncode == 2
-    assert clrt("convert", "models/a.obj", "b.obj", cwd=tmp_path).returncode == 2
-    done = clrt("convert", "models/a.obj", "b.toml", "--camera", "side", cwd=tmp_path)
+    assert called("convert", "models/a.obj", "scenes/a.toml", "--force", cwd=tmp_path).returncode == 0
+    assert called("convert", "scenes/a.toml", "b.toml", cwd=tmp_path).returncode == 2
+    assert called("convert", "models/a.obj", "b.obj", cwd=tmp_path).returncode == 2
+    done = called("convert", "models/a.obj", "b.toml", "--camera", "side", cwd=tmp_path)
     assert done.returncode == 3 and '--camera: "side" is unknown' in done.stderr

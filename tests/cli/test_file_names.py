@@ -202,6 +202,7 @@ def test_messages(folder: Path, locale: str, arguments: tuple[str, ...]) -> None
     assert done.returncode in {2, 3, 6} and "sc\\xe8ne" in told and "Traceback" not in told
 
 
+@pytest.mark.processes
 def test_warnings_in_json(folder: Path) -> None:
     """Each line of progress is a JSON object, also if it names a file."""
     (folder / os.fsdecode(b"\xe9.png")).unlink()

@@ -25,7 +25,7 @@ def test_a_file_is_whole_at_any_moment(tmp_path: Path) -> None:
     name = tmp_path / "a.exr"
     reference = run(tmp_path, "--spp", "1024", "-o", "reference.exr")
     assert reference.returncode == 0, reference.stderr
-    job = subprocess.Popen([*RENDER, "--time", "4", "--preview-every", ".05", "-o", str(name), "--seed", "5"])
+    job = subprocess.Popen([*RENDER, "--time", "2", "--preview-every", ".02", "-o", str(name), "--seed", "5"])
     seen: dict[tuple[int, int], np.ndarray] = {}
     while job.poll() is None:
         if name.exists():
@@ -52,7 +52,7 @@ def test_a_file_that_cannot_be_written(tmp_path: Path) -> None:
     folder = tmp_path / "gone"
     folder.mkdir()
     job = subprocess.Popen(
-        [*RENDER, "--time", "4", "--preview-every", ".1", "-o", str(folder / "a.png")],
+        [*RENDER, "--time", "2", "--preview-every", ".1", "-o", str(folder / "a.png")],
         cwd=tmp_path,
         stderr=subprocess.PIPE,
         text=True,

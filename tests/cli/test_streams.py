@@ -57,12 +57,9 @@ def test_progress_into_a_closed_stream(folder: Path) -> None:
     "arguments",
     [
         "info ball.toml",
-        "devices --json",
-        "cache",
-        "doctor",
-        "compare a.exr a.exr",
         "render ball.toml -q --print-kernel",
         "--help",
+        *others("devices --json", "cache", "doctor", "compare a.exr a.exr"),
     ],
 )
 def test_results_that_cannot_be_printed(folder: Path, arguments: str) -> None:

@@ -21,6 +21,7 @@ from clrt.cli.displays import make_progress
 from clrt.cli.goal import Goal
 from clrt.cli.progress_reporter import PHASES, PlainProgress
 
+from ..covering import others
 from .test_progress import SCENE, state
 
 TEXT = st.text("ab 7%", max_size=30)
@@ -195,10 +196,10 @@ def test_plain_lines(tmp_path: Path) -> None:
         ("devices",),
         ("doctor",),
         ("cache",),
-        ("debug", "scene.toml", "--pixel", "1,1"),
         ("render", "scene.toml", "--progress", "json"),
         ("render", "--help"),
         ("bench", "--help"),
+        *others((("debug", "scene.toml", "--pixel", "1,1"),)),
     ],
     ids=" ".join,
 )

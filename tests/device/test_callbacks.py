@@ -36,14 +36,14 @@ def test_all_that_come_one_by_one_are_waited_for(device: Device, monkeypatch: py
     """Together they take longer than the wait for one; one that never comes ends it."""
     monkeypatch.setattr(event_callbacks, "_expected", set())
     monkeypatch.setattr(event_callbacks, "_python_ends", Event())
-    monkeypatch.setattr(event_callbacks, "LAST_WAIT", 1.0)
+    monkeypatch.setattr(event_callbacks, "LAST_WAIT", 0.6)
     events = [cl.UserEvent(device.context) for _ in range(6)]
     for event in events:
         event_callbacks.when_complete(event, lambda: None)
 
     def complete() -> None:
         for event in events[1:]:
-            time.sleep(0.4)
+            time.sleep(0.2)
             event.set_status(cl.command_execution_status.COMPLETE)
 
     completed = beside(complete)

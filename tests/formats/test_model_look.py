@@ -15,6 +15,8 @@ from clrt.output.scenes import save_scene
 from clrt.scene.default_sky import SUN, default_sky
 from clrt.scene.model import Display, Ground
 
+from ..covering import others
+
 BOX = "".join(f"v {x} {y} {z}\n" for x in (0, 2) for y in (1, 2) for z in (0, 1)) + (
     "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
 )
@@ -69,7 +71,7 @@ def test_a_file_with_lights_keeps_these_under_the_sky(tmp_path: Path) -> None:
     assert is_sky(load(tmp_path / "lit.usda"))
 
 
-@pytest.mark.parametrize("look", ["studio", "sky", "none"])
+@pytest.mark.parametrize("look", ["studio", *others("sky", "none")])
 @pytest.mark.parametrize("view", [None, "left"])
 def test_a_written_scene_renders_the_same_and_is_shown_the_same(look: Any, view: str | None, box: Path) -> None:
     scene = load(box, view, look=look, size=(24, 16))

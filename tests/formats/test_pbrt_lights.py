@@ -48,6 +48,7 @@ def test_a_spherical_light_of_a_power_illuminates_like_a_point(folder: Path) -> 
         np.testing.assert_allclose(radiance(folder, light), 0.5 / np.pi * 500 / (4 * np.pi * 16), rtol=1e-2)
 
 
+@pytest.mark.programs
 def test_a_closed_furnace(folder: Path) -> None:
     """In an emissive sphere that reflects half of it, radiance doubles."""
     world = """Material "diffuse" "rgb reflectance" [.5 .5 .5] AreaLightSource "diffuse" "rgb L" [.5 .5 .5]

@@ -41,6 +41,7 @@ def test_a_scene_is_that_of_its_file(tmp_path: Path) -> None:
     assert any(mesh.material.color == pytest.approx((1, 0, 0)) for mesh in loaded.meshes)  # type: ignore[attr-defined]
 
 
+@pytest.mark.programs
 def test_rendering_is_that_of_its_file(tmp_path: Path) -> None:
     ball = trimesh.creation.icosphere(subdivisions=3)
     (tmp_path / "a.glb").write_bytes(ball.export(file_type="glb"))

@@ -100,6 +100,7 @@ def test_the_command_writes_them(tmp_path: Path) -> None:
     np.testing.assert_allclose(center, (0.8, 0.1, 0.1), atol=0.005)
 
 
+@pytest.mark.programs
 @pytest.mark.needs("pyoidn")
 def test_a_denoised_picture_has_them_and_the_raw_one_not(tmp_path: Path) -> None:
     result = run(tmp_path, "--aov", "direct", "--denoise", "-o", "a.exr")

@@ -132,6 +132,7 @@ def test_the_more_guides_the_smaller_the_error(image: clrt.Image, guides: dict[s
     assert 0 < whole < plain < raw / 2 and 0 < colored < plain
 
 
+@pytest.mark.programs
 def test_alpha_is_denoised_as_in_a_render() -> None:
     """As the layers of a transparent image; an array has the layers' shape."""
     options = {"size": (48, 32), "transparent": True, "seed": 3}

@@ -39,6 +39,21 @@ def rendered(scene: Scene, names: str = ",".join(AOVS), spp: int = 4, **options:
     return image.pixels, image.aovs  # type: ignore[return-value]
 
 
+#: What a first hit has.
+SEEN = "object,depth,position,albedo,normal,geometric_normal"
+
+
+def seen(scene: Scene) -> Pictures:
+    """Return the AOVs SEEN of the scene with panes beside the image, so that all scenes use one program."""
+
+    def pane(material: Any) -> Mesh:
+        return quad([(50, 0, 0), (50, 1, 0), (50, 1, 1), (50, 0, 1)], material)
+
+    panes = [pane(Mirror()), pane(Diffuse(opacity=0.0)), pane(Diffuse(one_sided=True))]
+    panes[0].normals = np.tile(np.array([0.6, 0.0, 0.8], np.float32), (4, 1))
+    return rendered(replace(scene, meshes=[*scene.meshes, *panes]), SEEN, integrator="depth")[1]
+
+
 ORIGIN = np.zeros(3)
 
 
@@ -77,7 +92,10 @@ def middles(size: tuple[int, int] = SIZE) -> tuple[Doubles, Doubles]:
 def test_places_and_numbers_are_those_of_the_middle_s_ray(at: Any, scale: float) -> None:
     """Depth, position and ids are those of the pixel centre's ray for any filter, scene position and scale."""
     _, found = rendered(
-        ball_on_floor(np.array(at), scale), "depth,position,primitive,object,material", filter="blackman_harris"
+        ball_on_floor(np.array(at), scale),
+        "depth,position,primitive,object,material",
+        filter="blackman_harris",
+        integrator="normals",
     )
     w, ball = middles()
     floor = (-1 - CAMERA.position[1]) / w[..., 1]
@@ -131,10 +149,10 @@ def test_albedo_and_normals_are_of_the_first_surface() -> None:
         render=RenderSettings(size=(3, 2)),
         camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20),
     )
-    _, found = rendered(scene, "albedo,normal,geometric_normal", integrator="depth")
+    found = seen(scene)
     for name, expected in (("albedo", (0.9, 0.8, 0.5)), ("normal", (0.6, 0, 0.8)), ("geometric_normal", (0, 0, 1))):
         np.testing.assert_allclose(found[name], np.broadcast_to(expected, (2, 3, 3)), rtol=1e-6, atol=1e-7)
-    _, found = rendered(replace(scene, meshes=[]), "albedo,normal,object,depth,position", integrator="depth")
+    found = seen(replace(scene, meshes=[]))
     assert not found["albedo"].any() and not found["normal"].any() and not found["position"].any()
     assert np.all(found["object"] == -1) and np.all(found["depth"] == np.inf)
 
@@ -183,7 +201,7 @@ def test_what_is_not_there_is_looked_through() -> None:
         render=RenderSettings(size=(3, 2)),
         camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20),
     )
-    _, found = rendered(scene, "object,depth,position,albedo", integrator="depth")
+    found = seen(scene)
     assert np.all(found["object"] == 2)
     np.testing.assert_allclose(found["depth"], 1.9, rtol=1e-6)
     np.testing.assert_allclose(found["position"][..., 2], -1, rtol=1e-6)
@@ -199,7 +217,7 @@ def test_albedo_is_a_mean_over_the_pixel() -> None:
         render=RenderSettings(size=(5, 3)),
         camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20),
     )
-    _, found = rendered(scene, "albedo", integrator="depth")
+    found = seen(scene)
     np.testing.assert_allclose(found["albedo"][:, 2], np.tile(np.multiply(RED, 0.5), (3, 1)), rtol=0.13)
     np.testing.assert_allclose(found["albedo"][:, :2], np.broadcast_to(RED, (3, 2, 3)), rtol=1e-6)
     assert not found["albedo"][:, 3:].any()

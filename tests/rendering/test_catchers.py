@@ -19,6 +19,7 @@ from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.validation.validate import validate
 
+from ..covering import others
 from .pictures import Doubles, film
 
 BLACK = Diffuse(color=(0.0, 0.0, 0.0))
@@ -101,7 +102,9 @@ def test_ambient_shadow_of_a_sphere(device: Device) -> None:
 
 
 @pytest.mark.parametrize(
-    "material", [GREY, MetallicRoughness(color=(0.8, 0.7, 0.6), metallic=1.0, roughness=0.15)], ids=["matte", "glossy"]
+    "material",
+    [MetallicRoughness(color=(0.8, 0.7, 0.6), metallic=1.0, roughness=0.15), *others(GREY)],
+    ids=["glossy", "matte"],
 )
 def test_over_the_bare_ground_it_is_the_whole_render(device: Device, material: Material) -> None:
     """Shadow, bounced light and reflection of a colored ball in colored light: over the render of the ground alone,
@@ -171,6 +174,7 @@ def test_instances_are_objects_and_may_be_catchers(device: Device) -> None:
         np.testing.assert_allclose(covered(film(device, other, sampler="sobol")), expected, atol=0.02)
 
 
+@pytest.mark.combinations
 def test_catchers_in_checkpoints_and_on_several_devices(device: Device, tmp_path: Path) -> None:
     """Two workers, and a render resumed from a checkpoint, give the film of one, to the last bit."""
     scene = caught(on_ground(lights=[SUN], environment=Environment(color=SKY), render={"spp": 16}))

@@ -122,7 +122,15 @@ def test_pictures_of_what_is_seen_first(device: Device, integrator: Integrator, 
 def test_aovs_of_what_is_seen_first(device: Device, culling: Culling) -> None:
     floor, wall = square(0, Diffuse()), square(5, Diffuse(), up=False)
     scene = Scene(meshes=[floor, wall], camera=Camera(position=(0, 10, 0), look_at=(0, 0, 0), up=(0, 0, 1)))
-    image = clrt.render(scene, device=device.info.index, size=(4, 4), spp=1, back_face_culling=culling, aovs="object")
+    image = clrt.render(
+        scene,
+        device=device.info.index,
+        size=(4, 4),
+        spp=1,
+        back_face_culling=culling,
+        aovs="object",
+        integrator="normals",
+    )
     assert np.all(image.aovs["object"] == (1 if culling == "none" else 0))
     assert image.report["back_face_culling"] == culling
 

@@ -12,6 +12,8 @@ import clrt
 from clrt.scene.on_ground import on_ground
 from clrt.scene.studio import FLOOR_COLOR, KEY, ROOM, studio
 
+from ..covering import others
+
 SPHERE = clrt.Sphere(center=(0, 1, 0), radius=1, material=clrt.Diffuse(color=(0.8, 0.1, 0.1)))
 GROUND = clrt.Ground(height=0, radius=5, color=(FLOOR_COLOR,) * 3)
 #: The whole image is below the horizon.
@@ -42,7 +44,7 @@ def test_it_catches_the_contact_shadow() -> None:
     assert shown[:4].mean() == pytest.approx(ROOM, rel=0.02)
 
 
-@pytest.mark.parametrize("integrator", ["normals", "albedo", "depth"])
+@pytest.mark.parametrize("integrator", ["normals", *others("albedo", "depth")])
 def test_images_of_data_are_without_it(integrator: Any) -> None:
     one, other = (rendered(scene(ground=ground), spp=4, integrator=integrator) for ground in (GROUND, None))
     assert (one.pixels == other.pixels).all()
@@ -62,7 +64,7 @@ def test_a_backdrop_is_not_covered() -> None:
     np.testing.assert_allclose(image.pixels[0, 0], (0.1, 0.5, 0.2), rtol=1e-5)
 
 
-@pytest.mark.parametrize("integrator", ["local", "raster"])
+@pytest.mark.parametrize("integrator", ["raster", *others("local")])
 def test_integrators_without_catchers_render_transparent_images(integrator: Any) -> None:
     alpha = rendered(scene(), integrator=integrator, transparent=True, spp=1).alpha
     assert alpha is not None and set(alpha.ravel().tolist()) == {0.0, 1.0}

@@ -241,7 +241,7 @@ def test_renderer_farm_and_report_take_every_one(device: Device, name: str) -> N
     options: dict[str, Any] = {"size": (8, 8), "device": device.info.index}
     options |= {"aovs": (BY_AOVS[name],)} if name in BY_AOVS else {name: OTHER[name]}
     assert options.keys() <= inspect.signature(clrt.Renderer).parameters.keys()
-    content = scene(meshes=[], instances=[], lights=[], environment=clrt.Environment(color=(1.0, 1.0, 1.0)))
+    content = scene(meshes=[], instances=[], spheres=[], lights=[], environment=clrt.Environment(color=(1.0, 1.0, 1.0)))
     order, wanted = PictureOrder(content, options), changed(content.render, Choices(), name)
     assert order.choices == choices_of(options) == wanted[1]
     assert order.settled.render == settings_of(content.render, options) == replace(wanted[0], size=options["size"])

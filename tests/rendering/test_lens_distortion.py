@@ -145,9 +145,9 @@ def test_wide_fisheyes_image_their_rays_at_the_pixels(device: Device) -> None:
             fisheye_degrees=rng.uniform(90, 300),
             distortion=tuple(fisheye_distortion(rng)),
         )
-        for _ in range(4000)
+        for _ in range(1000)
     ]
-    pixels = rng.uniform((0, 0), SIZE, (4000, PIXELS, 2))
+    pixels = rng.uniform((0, 0), SIZE, (1000, 4 * PIXELS, 2))
     directions, has_ray = rays(device, cameras, SIZE, pixels)
     angle = np.arctan2(np.linalg.norm(directions[..., :2], axis=2), directions[..., 2])
     k = np.array([camera.distortion for camera in cameras])[:, None]
@@ -264,7 +264,7 @@ def photograph(device: Device, lens: dict[str, Any], spp: int = 64) -> tuple[Cam
 
 
 @pytest.mark.needs("cv2")
-@pytest.mark.parametrize("name", [*[*LENSES][:2], *others(*[*LENSES][2:])])
+@pytest.mark.parametrize("name", ["barrel", *others("pincushion", "rational", "fisheye")])
 def test_a_rendered_checkerboard_has_its_corners_where_opencv_projects_them(device: Device, name: str) -> None:
     """Corners refined in the image (saddle points) lie within a tenth of a pixel of `projectPoints`."""
     import cv2
@@ -325,6 +325,7 @@ def test_a_lens_distorts_first(device: Device) -> None:
     assert set(map(tuple, np.argwhere(picture[..., 0]).tolist())) == expected and len(expected) == 4
 
 
+@pytest.mark.programs
 def test_flow_between_distorted_cameras(device: Device) -> None:
     """Flow from a distorted to a fisheye camera, both seeing one plane, is that of the corners' projections."""
     size = (64, 48)

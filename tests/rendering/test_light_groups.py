@@ -300,13 +300,14 @@ def test_only_what_is_asked_for_is_compiled() -> None:
     assert set(asked.buffers) - set(plain.buffers) == {"emitter_groups"}
 
 
-def test_a_checkpoint_keeps_the_groups(tmp_path: Path) -> None:
+@pytest.mark.parametrize("aovs", ["light_groups", *others("light_groups,direct")])
+def test_a_checkpoint_keeps_the_groups(tmp_path: Path, aovs: str) -> None:
     path, scene = tmp_path / "a.ck", grouped()
-    for _ in clrt.Renderer(scene, spp=24, aovs="light_groups,direct", checkpoint=path).passes(spp=8):
+    for _ in clrt.Renderer(scene, spp=24, aovs=aovs, checkpoint=path).passes(spp=8):
         pass
-    resumed = clrt.Renderer(scene, spp=24, aovs="light_groups,direct", checkpoint=path, resume=True)
+    resumed = clrt.Renderer(scene, spp=24, aovs=aovs, checkpoint=path, resume=True)
     *_, state = resumed.passes(spp=24)
-    whole = clrt.render(scene, spp=24, aovs="light_groups,direct").aovs
+    whole = clrt.render(scene, spp=24, aovs=aovs).aovs
     found = resumed.aovs(state)
     assert list(found) == list(whole)
     for name, layer in found.items():
@@ -315,7 +316,7 @@ def test_a_checkpoint_keeps_the_groups(tmp_path: Path) -> None:
         clrt.Renderer(scene, spp=24, aovs="direct", checkpoint=path, resume=True)
     renamed = replace(scene, environment=replace(scene.environment, light_group="key"))
     with pytest.raises(CheckpointError, match="of another render \\(different environment\\)"):
-        clrt.Renderer(renamed, spp=24, aovs="light_groups,direct", checkpoint=path, resume=True)
+        clrt.Renderer(renamed, spp=24, aovs=aovs, checkpoint=path, resume=True)
 
 
 @pytest.mark.combinations

@@ -24,6 +24,7 @@ from clrt.scene.lights import GoniometricLight, Light, PointLight, ProjectorLigh
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, RenderSettings, Scene
 
+from ..covering import others
 from ..oracle.lights import arriving as facing
 from .pictures import film, pixel_points, quad
 
@@ -94,7 +95,7 @@ def test_the_top_left_pixel_is_at_the_top_left(device: Device, kind: type[Any]) 
     assert (left_top, right_top, left_low, right_low) == ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1])
 
 
-@pytest.mark.parametrize("integrator", ["path", "direct", "local", "raster"])
+@pytest.mark.parametrize("integrator", ["path", "raster", *others("direct", "local")])
 def test_a_screen_is_evenly_lit(device: Device, integrator: Any) -> None:
     """A white projector gives a white screen at the distance z the irradiance intensity/z², in a rectangle of the
     image's shape, and nothing around it; with an object between, its shadow."""

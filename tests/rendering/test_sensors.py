@@ -76,7 +76,7 @@ def test_under_a_panel_irradiance_is_lamberts(device: Device) -> None:
     check_within_three_standard_errors(measured, 2 * lambert(points, normals, corners)[:, None].repeat(3, 1))
 
 
-@pytest.mark.parametrize("sampler", get_args(Sampler))
+@pytest.mark.parametrize("sampler", ["sobol", *others(*(name for name in get_args(Sampler) if name != "sobol"))])
 def test_standard_errors_are_those_of_repetitions(device: Device, sampler: Sampler) -> None:
     """For samples that depend on each other, too."""
     random = np.random.default_rng(todays_seed())

@@ -92,8 +92,9 @@ def test_spheres_as_in_float64(device: Device, layout: str) -> None:
     t, which, margin = rays.hit_spheres(table.astype(np.float64), origin, direction)
     clear = margin > 1e-3
     assert np.count_nonzero(clear & np.isfinite(t)) > 10_000
-    found = Probe(device, Scene(spheres=balls(table)), layout=layout)("closest_hit", 4, origin, direction)
-    np.testing.assert_array_equal(found[clear, 3], np.where(np.isfinite(t), which, -1)[clear])
+    far = Mesh(soup(1).reshape(-1, 3) + np.float32(1e4), np.array([[0, 1, 2]], np.int32))  # for any-hit's program
+    found = Probe(device, Scene(meshes=[far], spheres=balls(table)), layout=layout)("closest_hit", 4, origin, direction)
+    np.testing.assert_array_equal(found[clear, 3], np.where(np.isfinite(t), 1 + which, -1)[clear])
     hit = clear & np.isfinite(t)
     there = origin[hit] + found[hit, :1] * direction[hit]
     # Distance from the surface, with the rounding of origin − centre and of the root, which grazing rays amplify.

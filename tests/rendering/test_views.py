@@ -47,6 +47,7 @@ def test_alpha_makes_views_transparent(device: Device) -> None:
     np.testing.assert_array_equal(np.concatenate([found["rgb"][0], found["alpha"][0]], axis=2), expected.layers)
 
 
+@pytest.mark.programs
 def test_without_light_the_layers_are_the_same(device: Device) -> None:
     scene = clrt.load(SCENES / "textures.toml")
     options: dict[str, Any] = {"size": SIZE, "spp": 1, "device": device.info.index}
@@ -112,8 +113,9 @@ def test_flow_leads_to_the_same_point(device: Device) -> None:
 
 
 def test_a_camera_that_stays_has_no_flow(device: Device) -> None:
-    scene = clrt.load(SCENES / "cornell.toml")
-    views = clrt.render_views(scene, [scene.camera] * 2, "flow", size=SIZE, device=device.info.index)
+    scene = clrt.load(SCENES / "spot.toml")
+    layers = ["flow", "position", "object"]  # the program of the test before
+    views = clrt.render_views(scene, [scene.camera] * 2, layers, size=SIZE, device=device.info.index)
     assert np.nanmax(np.abs(views["flow"][0])) < 2e-3
 
 
