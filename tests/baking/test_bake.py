@@ -75,6 +75,7 @@ def test_standard_errors_are_those_of_repetitions(device: Device) -> None:
     assert np.sqrt(np.mean(claimed**2 / spread**2)) == pytest.approx(1, abs=0.2)
 
 
+@pytest.mark.programs
 def test_direct_and_indirect_light_sum_to_all(device: Device) -> None:
     scene = clrt.load(SCENES / "cornell.toml")
     floor = next(mesh for mesh in scene.meshes if mesh.name == "floor")

@@ -73,15 +73,15 @@ def clrt(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
 def called(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
     """Return what `clrt` says and returns, without a process of its own, whose start takes longer than a mistake, and
     without the watchdog, which would fork this one."""
-    outputs = [io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for _ in range(2)]
+    said, told = io.BytesIO(), io.BytesIO()
+    outputs = [io.TextIOWrapper(each, "utf-8", write_through=True) for each in (said, told)]
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(outputs[0]), redirect_stderr(outputs[1]):
         patch.setenv(VARIABLE, "0")
         patch.chdir(cwd)
         with pytest.raises(SystemExit) as ended:
             main([*map(str, arguments)])
-    said, told = (output.buffer.getvalue().decode() for output in outputs)  # type: ignore[attr-defined]
     assert isinstance(ended.value.code, int)
-    return subprocess.CompletedProcess(arguments, ended.value.code, said, told)
+    return subprocess.CompletedProcess("clrt", ended.value.code, said.getvalue().decode(), told.getvalue().decode())
 
 
 Run = Callable[..., subprocess.CompletedProcess[str]]

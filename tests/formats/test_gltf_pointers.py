@@ -180,6 +180,7 @@ def test_what_is_not_supported_is_named(pointer: str, tmp_path: Path, caplog: py
     assert any(message.endswith(f'left out: "{pointer}" of animation "animation 0"') for message in caplog.messages)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize(
     ("pointer", "values"),
     [

@@ -18,6 +18,7 @@ from clrt.scene.geometry.transform import transform_mesh
 from clrt.scene.materials.textures import WHITE, Picture, Texture
 from clrt.scene.model import Mesh
 
+from ..covering import others
 from .test_mitsuba_xml import problem
 
 BUMP = """<bsdf type="bumpmap"><float name="scale" value="{scale}"/><texture type="bitmap">
@@ -90,7 +91,9 @@ def test_an_image_that_is_repeated_in_different_sizes(folder: Path, caplog: pyte
     assert np.isfinite(sizes_over(flat, Texture(picture=WHITE)).median).all()
     waves(folder)
     bump = BUMP.format(scale=0.1, to_uv='<scale value="3"/>')
-    shape = f'<shape type="sphere">{bump}</shape>'
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 3 0 0\nv 0 3 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+    (folder / "a.obj").write_text(f"{corners}f 1/1 2/2 3/3\nf 1/1 4/2 5/3\n")
+    shape = f'<shape type="obj"><string name="filename" value="a.obj"/>{bump}</shape>'
     said = problem(folder, shape)
     assert "repeated on a shape in different sizes" in said and "--approximate" in said
     with caplog.at_level(logging.WARNING):
@@ -133,9 +136,8 @@ def test_two_shapes_share_a_normal_map_if_they_can(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("to_uv", "to_world"),
     [
-        ("", '<scale x="2"/>'),
         ('<scale x="2" y="-1"/>', '<rotate y="1" angle="30"/><rotate x="1" angle="-20"/>'),
-        ('<rotate z="1" angle="30"/><scale value="1.2"/>', ""),
+        *others(("", '<scale x="2"/>'), ('<rotate z="1" angle="30"/><scale value="1.2"/>', "")),
     ],
 )
 def test_images_are_mitsubas(folder: Path, to_uv: str, to_world: str) -> None:

@@ -12,6 +12,7 @@ from clrt.bench.numerics.bsdf_cases import bsdfs
 from clrt.device.open import Device
 from clrt.scene.materials.material_types import Conductor, Dielectric, Material
 
+from ..covering import covering
 from .test_mitsuba_xml import material
 
 #: Of float32, most of it by the cancellation in half vectors of refraction, and in the exponent of Beckmann's.
@@ -25,9 +26,7 @@ CASES = {"roughdielectric": GLASS + TINTS, "roughconductor": METAL, "roughconduc
 
 
 @pytest.mark.needs("mitsuba")
-@pytest.mark.parametrize("kind", CASES)
-@pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
-@pytest.mark.parametrize("alpha", [0.1, 0.3, 0.6])
+@covering("kind, distribution, alpha", CASES, ["ggx", "beckmann"], [0.1, 0.3, 0.6])
 def test_values_are_mitsubas(folder: Path, device: Device, kind: str, distribution: str, alpha: float) -> None:
     """f·|cos| at random directions on both sides, for light from both sides of glass."""
     mitsuba = import_module("mitsuba")

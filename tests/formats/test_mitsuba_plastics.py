@@ -14,6 +14,7 @@ from clrt.device.open import Device
 from clrt.formats.scene_parts.coats import coat as coat_under
 from clrt.scene.materials.plastic import Distribution, Plastic, coat_of
 
+from ..covering import covering
 from .test_mitsuba_xml import material, problem
 
 #: Of float32, of both quadratures over facets, and of Mitsuba's r of smooth coats, a fit.
@@ -59,9 +60,7 @@ def test_what_is_read(folder: Path) -> None:
 
 
 @pytest.mark.needs("mitsuba")
-@pytest.mark.parametrize("nonlinear", [False, True])
-@pytest.mark.parametrize("distribution", ["ggx", "beckmann"])
-@pytest.mark.parametrize("roughness", [0.0, 0.2, 0.45, 0.7])
+@covering("roughness, distribution, nonlinear", [0.0, 0.2, 0.45, 0.7], ["ggx", "beckmann"], [False, True])
 def test_values_are_mitsubas(device: Device, roughness: float, distribution: Distribution, nonlinear: bool) -> None:
     """f·cos at random directions; for a smooth coat that of the base, off the mirror direction."""
     mitsuba = import_module("mitsuba")

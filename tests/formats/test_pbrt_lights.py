@@ -39,6 +39,7 @@ def test_lights_illuminate_by_closed_forms(folder: Path, light: str, irradiance:
     np.testing.assert_allclose(radiance(folder, light), 0.5 / np.pi * expected, rtol=2e-3)
 
 
+@pytest.mark.programs
 def test_a_spherical_light_of_a_power_illuminates_like_a_point(folder: Path) -> None:
     """Φ/(4πd²) on a plane that faces it, whatever its radius, also if it is scaled."""
     black = 'Material "diffuse" "rgb reflectance" [0 0 0]'

@@ -15,6 +15,8 @@ from clrt.scene.model import Camera, Mesh, RenderSettings, Scene
 from clrt.scene.sky.hosek_wilkie import SkyRadiance
 from clrt.scene.sky.sky import Sky
 
+from ..covering import others
+
 if TYPE_CHECKING:
     from clrt.device.open import Device
 
@@ -33,7 +35,7 @@ def irradiance_of_the_model(elevation: float) -> NDArray[np.float64]:
     return np.asarray(2 * np.pi * (weights * height[:, 0]) @ values)
 
 
-@pytest.mark.parametrize("elevation", [8.0, 55.0])
+@pytest.mark.parametrize("elevation", [8.0, *others(55.0)])
 def test_a_plane_is_as_bright_as_the_ground_around_it(elevation: float, device: Device) -> None:
     """A diffuse plane under the sky against the quadrature of the map and the sun, and against the map's lower half."""
     up = np.radians(elevation)

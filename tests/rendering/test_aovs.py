@@ -324,14 +324,14 @@ def test_only_what_is_asked_for_is_compiled() -> None:
 
 def test_a_checkpoint_keeps_direct_light(tmp_path: Any) -> None:
     """A checkpoint without direct light is rejected as another render's."""
-    path = tmp_path / "a.ck"
-    for _ in Renderer(everything(), spp=24, aovs="direct", checkpoint=path).passes(spp=8):
+    path, scene = tmp_path / "a.ck", ball_on_floor()
+    for _ in Renderer(scene, spp=24, aovs="direct", checkpoint=path).passes(spp=8):
         pass
-    resumed = Renderer(everything(), spp=24, aovs="direct", checkpoint=path, resume=True)
+    resumed = Renderer(scene, spp=24, aovs="direct", checkpoint=path, resume=True)
     *_, state = resumed.passes(spp=24)
-    np.testing.assert_array_equal(resumed.aovs(state)["direct"], rendered(everything(), "direct", 24)[1]["direct"])
+    np.testing.assert_array_equal(resumed.aovs(state)["direct"], rendered(scene, "direct", 24)[1]["direct"])
     with pytest.raises(CheckpointError, match="of another render \\(with --aov direct or indirect\\)"):
-        Renderer(everything(), spp=24, checkpoint=path, resume=True)
+        Renderer(scene, spp=24, checkpoint=path, resume=True)
 
 
 def test_names() -> None:

@@ -182,7 +182,7 @@ def test_all_around_closes_at_its_ends(device: Device, filter: str) -> None:
     assert picture.min() >= image.min() and picture.max() <= image.max()
 
 
-@pytest.mark.parametrize("name", ["lens", "parallel", "all around"])
+@pytest.mark.parametrize("name", ["lens", *others("parallel", "all around")])
 def test_guides_are_seen_by_the_same_rays(device: Device, name: str) -> None:
     """With emission equal to albedo, the image of emission equals the albedo guide, sample by sample."""
     rng = np.random.default_rng(2)

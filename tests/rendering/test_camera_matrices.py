@@ -14,6 +14,7 @@ from clrt.rendering.compile.camera_kernel import launch_record
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, RenderSettings, Scene, Sphere
 
+from ..covering import others
 from .pictures import film
 
 Doubles = NDArray[np.float64]
@@ -56,7 +57,9 @@ def test_rays_go_through_what_projects_to_their_pixel() -> None:
     assert worst < 1e-6
 
 
-@pytest.mark.parametrize("lens", [{}, {"aperture_radius": 0.05, "focus_distance": 9.0}], ids=["pinhole", "lens"])
+@pytest.mark.parametrize(
+    "lens", [{}, *others({"aperture_radius": 0.05, "focus_distance": 9.0})], ids=["pinhole", "lens"]
+)
 def test_spheres_are_seen_where_they_project(device: Device, lens: dict[str, Any]) -> None:
     """Spheres smaller than a pixel, at pixel centers; with a lens in its plane of focus, whatever the shift."""
     rng = np.random.default_rng(7)

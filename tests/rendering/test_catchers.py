@@ -122,6 +122,7 @@ def test_over_the_bare_ground_it_is_the_whole_render(device: Device, material: M
         assert np.abs(over - whole.mean).mean() < 2e-3
 
 
+@pytest.mark.programs
 def test_over_a_photo_it_is_the_render_of_the_photographed_ground(device: Device) -> None:
     """A photo of a colored ground in colored light, with the shadow of a black ball: to 1/255 what the ground with the
     ball is, whatever the catcher's own color."""

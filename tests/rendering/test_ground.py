@@ -64,7 +64,7 @@ def test_a_backdrop_is_not_covered() -> None:
     np.testing.assert_allclose(image.pixels[0, 0], (0.1, 0.5, 0.2), rtol=1e-5)
 
 
-@pytest.mark.parametrize("integrator", ["raster", *others("local")])
+@pytest.mark.parametrize("integrator", ["local", *others("raster")])
 def test_integrators_without_catchers_render_transparent_images(integrator: Any) -> None:
     alpha = rendered(scene(), integrator=integrator, transparent=True, spp=1).alpha
     assert alpha is not None and set(alpha.ravel().tolist()) == {0.0, 1.0}

@@ -214,6 +214,7 @@ def test_sizes_do_not_matter(device: Device, mesh_size: float, world_size: float
     np.testing.assert_array_equal(film(device, scaled).mean, film(device, scene).mean)
 
 
+@pytest.mark.programs
 def test_a_mesh_that_is_drawn_itself_is_stored_once(device: Device) -> None:
     scene = crowd("turned")
     mesh = scene.instances[1].mesh

@@ -250,7 +250,7 @@ LENSES: dict[str, dict[str, Any]] = {
 }
 
 
-def photograph(device: Device, lens: dict[str, Any], spp: int = 64) -> tuple[Camera, Doubles, Doubles]:
+def photograph(device: Device, lens: dict[str, Any], spp: int = 32) -> tuple[Camera, Doubles, Doubles]:
     """Return a camera before a checkerboard, the image (h, w), and the board's inner corners."""
     meshes, corners = board(10)
     eye = (0.4, -0.3, 4.0)

@@ -59,6 +59,20 @@ def grouped(seed: int = 0) -> Scene:
     )
 
 
+def lamp_and_mirror() -> Scene:
+    """Return a lamp, seen directly, through a veil and in a mirror, and a sky, in groups of their own."""
+    lamp = Sphere(
+        center=(0, 2, 0), radius=0.5, material=Diffuse(color=(0, 0, 0), emission=(3, 2, 1), light_group="lamp")
+    )
+    veil = Sphere(center=(0, 1, 1.5), radius=0.3, material=Diffuse(color=(0, 0, 0), opacity=0.5))
+    return Scene(
+        spheres=[lamp, veil, Sphere(material=Mirror())],
+        environment=Environment(color=(0, 1, 0), light_group="sky"),
+        camera=clrt.Camera(position=(0, 1, 5)),
+        render=clrt.RenderSettings(size=(24, 24), spp=4),
+    )
+
+
 def clamped(scene: Scene) -> Scene:
     return replace(scene, render=replace(scene.render, clamp_direct=1.0, clamp_indirect=0.5))
 
@@ -302,7 +316,7 @@ def test_only_what_is_asked_for_is_compiled() -> None:
 
 @pytest.mark.parametrize("aovs", ["light_groups", *others("light_groups,direct")])
 def test_a_checkpoint_keeps_the_groups(tmp_path: Path, aovs: str) -> None:
-    path, scene = tmp_path / "a.ck", grouped()
+    path, scene = tmp_path / "a.ck", lamp_and_mirror()
     for _ in clrt.Renderer(scene, spp=24, aovs=aovs, checkpoint=path).passes(spp=8):
         pass
     resumed = clrt.Renderer(scene, spp=24, aovs=aovs, checkpoint=path, resume=True)
@@ -330,7 +344,7 @@ def test_several_devices_store_the_same_groups(device: Device) -> None:
 
 
 def test_views_have_a_layer_of_each_group() -> None:
-    scene = replace(grouped(), render=replace(grouped().render, spp=2))
+    scene = lamp_and_mirror()
     views = clrt.render_views(scene, [scene.camera], ["rgb", "light_groups", "depth"])
     layers = [name for name in views if name.startswith("light_group.")]
     assert list(views) == ["rgb", *(f"light_group.{name}" for name in light_groups(scene)), "depth"]
@@ -339,17 +353,7 @@ def test_views_have_a_layer_of_each_group() -> None:
 
 def test_a_lamp_in_a_mirror_is_in_its_group() -> None:
     """Seen directly, in a mirror, and through what lets light pass: all of its light, and no other group's."""
-    lamp = Sphere(
-        center=(0, 2, 0), radius=0.5, material=Diffuse(color=(0, 0, 0), emission=(3, 2, 1), light_group="lamp")
-    )
-    veil = Sphere(center=(0, 1, 1.5), radius=0.3, material=Diffuse(color=(0, 0, 0), opacity=0.5))
-    scene = Scene(
-        spheres=[lamp, veil, Sphere(material=Mirror())],
-        environment=Environment(color=(0, 1, 0), light_group="sky"),
-        camera=clrt.Camera(position=(0, 1, 5)),
-        render=clrt.RenderSettings(size=(24, 24), spp=4),
-    )
-    found = clrt.render(scene, aovs="light_groups").light_groups
+    found = clrt.render(lamp_and_mirror(), aovs="light_groups").light_groups
     assert not found["sky"][..., [0, 2]].any() and found["sky"].any()
     np.testing.assert_allclose(found["lamp"] / [3, 2, 1], found["lamp"][..., :1] / np.full(3, 3), rtol=1e-5)
     assert found["lamp"].max() == 3

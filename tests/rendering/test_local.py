@@ -18,6 +18,7 @@ from clrt.scene.lights import DirectionalLight, Light, PointLight
 from clrt.scene.materials.material_types import BlinnPhong, Dielectric, Diffuse, Material, Mirror, Phong
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 
+from ..covering import others
 from .pictures import film, pixel_means, pixel_p_values, pixel_points, quad
 
 RED, GLOSS = (0.7, 0.3, 0.2), (0.5, 0.5, 0.4)
@@ -43,7 +44,7 @@ def glossy(material: Phong, wo: Doubles, wi: Doubles) -> Doubles:
     return np.asarray(np.maximum(np.sum(mirrored * wi, axis=-1), 0) ** material.shininess)
 
 
-@pytest.mark.parametrize("kind", [Phong, BlinnPhong])
+@pytest.mark.parametrize("kind", [BlinnPhong, *others(Phong)])
 def test_points_light_a_plane_as_the_books_say(device: Device, kind: type[Phong]) -> None:
     """ambient·color·sky + Σ I/(pi·d²)·(color·cos + specular·cos^n), where pi cancels."""
     material = kind(color=RED, specular=GLOSS, shininess=20.0, ambient=0.6)

@@ -24,6 +24,8 @@ from clrt.scene.lights import LIGHTS
 from clrt.scene.materials.material_types import MATERIALS
 from clrt.scene.model import MATRICES, Scene
 
+from ..covering import others
+
 VERTICES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 FACES = np.array([[0, 1, 2]], np.int32)
 UV = VERTICES[:, :2].copy()
@@ -118,21 +120,26 @@ VALUES: SearchStrategy[Any] = (
 
 
 @pytest.mark.filterwarnings("ignore:overflow encountered in cast", "ignore:invalid value encountered in cast")
+@pytest.mark.parametrize("examples", [10, *others(40)])
 @pytest.mark.parametrize(("kind", "name"), FIELDS, ids=lambda part: getattr(part, "__name__", part))
-@settings(max_examples=25, deadline=None, derandomize=True)
-@given(data=st.data())
-def test_what_can_be_made_can_be_rendered(kind: type, name: str, data: DataObject) -> None:
+def test_what_can_be_made_can_be_rendered(kind: type, name: str, examples: int) -> None:
     """Any value of any field is refused with one of clrt's errors when the object is made, or when it becomes part of
     a scene; or else the scene is compiled without an error."""
     make, scene_of = MADE[kind]
-    try:
-        scene = scene_of(make(**{name: data.draw(VALUES, label=name)}))
-    except ClrtError as refused:
-        assert isinstance(refused, SceneError) and ": " in str(refused)
-        return
-    if scene.animation is not None:
-        _, scene = next(clrt.frames(scene, [0]))
-    compile_scene(scene, Choices())
+
+    @settings(max_examples=examples, deadline=None, derandomize=True)
+    @given(data=st.data())
+    def check(data: DataObject) -> None:
+        try:
+            scene = scene_of(make(**{name: data.draw(VALUES, label=name)}))
+        except ClrtError as refused:
+            assert isinstance(refused, SceneError) and ": " in str(refused)
+            return
+        if scene.animation is not None:
+            _, scene = next(clrt.frames(scene, [0]))
+        compile_scene(scene, Choices())
+
+    check()
 
 
 def arrays_of(value: Any) -> list[np.ndarray[Any, Any]]:
