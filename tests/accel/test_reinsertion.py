@@ -24,7 +24,7 @@ from .device_trees import Binary, binary, like_gpu
 Children = list[list[int]]
 
 
-@pytest.mark.parametrize("case", [*SCENES][::3] + others(*(case for case in SCENES if case not in [*SCENES][::3])))
+@pytest.mark.parametrize("case", [*SCENES][::4] + others(*(case for case in SCENES if case not in [*SCENES][::4])))
 def test_trees_stay_sound_and_their_area_never_grows(device: Device, case: str) -> None:
     before = binary(device, "bvh8", case)
     deepest, area = max(before.depth, DEEP), before.total_area

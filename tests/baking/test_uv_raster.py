@@ -11,6 +11,7 @@ from clrt.baking import uv_raster
 from clrt.baking.triangle_points import nearest_weights
 from clrt.baking.uv_raster import texel_faces
 
+from ..covering import others
 from ..oracle.scenes import todays_seed
 
 Doubles = NDArray[np.float64]
@@ -43,7 +44,7 @@ def triangles(random: np.random.Generator, size: tuple[int, int]) -> Doubles:
     return np.clip(corners, 0.01, np.array(size) - 0.01)
 
 
-@pytest.mark.parametrize("texels", [uv_raster.TEXELS, 7])
+@pytest.mark.parametrize("texels", [7, *others(uv_raster.TEXELS)])
 def test_each_texel_has_the_nearest_of_the_faces_that_cover_it(monkeypatch: pytest.MonkeyPatch, texels: int) -> None:
     monkeypatch.setattr(uv_raster, "TEXELS", texels)
     monkeypatch.setattr(uv_raster, "ROWS", texels)

@@ -107,6 +107,7 @@ def test_frames_are_the_stills_at_their_times(tmp_path: Path, copied: bool) -> N
     assert hashes[0] == scene_hash(scene), "a still shows the start"
 
 
+@pytest.mark.programs
 def test_frames_are_rendered_as_their_stills(tmp_path: Path) -> None:
     """Bit for bit, where the BVH is refitted, with the options of a scene file's camera animation."""
     path = written(tmp_path, SCENE + KEYFRAMES)

@@ -159,6 +159,7 @@ def test_a_rolling_shutter_shears_an_edge(device: Device, moves: str, opened: fl
     assert agrees(film(device, scene), white)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("aperture", [0.1, *others(0.0)])
 def test_a_distorting_lens_zooms(device: Device, aperture: float) -> None:
     """With hardly any distortion a zoom is that of the lens without distortion, in light and in data."""

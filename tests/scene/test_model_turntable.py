@@ -22,6 +22,8 @@ from clrt.scene.geometry.transform import unit
 from clrt.scene.lights import DirectionalLight
 from clrt.scene.model import Scene
 
+from ..covering import covering
+
 Doubles = NDArray[np.float64]
 SIZES = [(64, 64), (120, 90), (90, 120), (400, 60), (60, 400)]
 LONG = np.array(list(itertools.product((-0.2, 0.2), (-0.2, 0.2), (-1.5, 1.5))))
@@ -63,8 +65,7 @@ def test_a_model_stays_in_the_image_and_fills_it(seed: int, turns: Turns, tmp_pa
     assert (np.ptp(extents, axis=1) / 2).max() > 0.6
 
 
-@pytest.mark.parametrize("view", [None, "back", "left"])
-@pytest.mark.parametrize("seed", range(10))
+@covering("seed, view", range(10), [None, "back", "left"])
 def test_the_camera_is_the_nearest(seed: int, view: str | None, tmp_path: Path) -> None:
     """In a whole turn the outermost vertex reaches FILL of half the image, and the margins are equal."""
     scene = load(model(tmp_path, random_points(seed)), view, size=SIZES[seed % 5])
