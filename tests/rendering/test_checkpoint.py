@@ -15,7 +15,7 @@ from clrt.errors import ClrtError, OutputError, UsageError
 from clrt.rendering.checkpoint.checkpoint_file import write_checkpoint
 from clrt.rendering.renderer import Renderer
 
-from ..covering import covering
+from ..covering import covering, others
 from .checkpoints import renderer, run, same
 
 
@@ -66,7 +66,7 @@ def interrupt_after(running: Renderer, launches: int) -> None:
     setattr(running.session.work, "cut", counted)
 
 
-@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
+@pytest.mark.parametrize("adaptive", [True, *others(False)], ids=["adaptive", "even"])
 def test_from_whatever_was_written_on_the_way(
     device: Device, tmp_path: Path, small_launches: None, adaptive: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

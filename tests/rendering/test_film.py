@@ -121,6 +121,7 @@ def test_noise_is_the_error(device: Device, spp: int) -> None:
     assert abs(picture.noise**2 / true_square - 1) < 4 * np.sqrt(2) * spread
 
 
+@pytest.mark.programs
 def test_noise_falls_with_the_root_of_the_samples(device: Device) -> None:
     lamp = quad([(-1, 2, -1), (1, 2, -1), (1, 2, 1), (-1, 2, 1)], Diffuse(emission=(5.0, 5.0, 5.0)))
     floor = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse())

@@ -122,7 +122,7 @@ def test_lights_scale_with_the_scene(device: Device, kind: type[Light], seed: in
 
 
 @pytest.mark.parametrize("kind", LIGHTS)
-@pytest.mark.parametrize("seed", [0, 1, *others(*SEEDS[2:])])
+@pytest.mark.parametrize("seed", [1, *others(0, *SEEDS[2:])])
 def test_bounds_leave_out_nothing(device: Device, kind: type[Light], seed: int) -> None:
     """Where a sample of a light arrives above the horizon, the light has a positive probability beside another one."""
     light, (p, n) = random_light(kind, seed), points(4096)

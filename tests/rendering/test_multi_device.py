@@ -18,6 +18,7 @@ from clrt.rendering.accumulation.multi_device import MultiDeviceAccumulation
 from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.renderer import Renderer
 
+from ..covering import others
 from .checkpoints import SIZE, renderer, run, same
 from .test_checkpoint import interrupt_after
 from .test_noise import room
@@ -50,7 +51,7 @@ def test_same_picture(device: Device, adaptive: bool, stops: dict[str, float], c
     assert sum(worker.samples > 0 for worker in together.session.workers) >= 2
 
 
-@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
+@pytest.mark.parametrize("adaptive", [False, *others(True)], ids=["even", "adaptive"])
 def test_interrupted_it_goes_on_alone_and_together(
     device: Device, tmp_path: Path, small_launches: None, adaptive: bool
 ) -> None:

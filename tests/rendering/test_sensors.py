@@ -139,6 +139,7 @@ def is_matte(mesh: clrt.Mesh) -> bool:
     return isinstance(material, clrt.Diffuse) and isinstance(material.color, tuple) and material.emission == (0, 0, 0)
 
 
+@pytest.mark.programs
 @pytest.mark.parametrize("name", ["cornell", *others("spot", "night")])
 def test_lambertian_surfaces_reflect_their_irradiance(device: Device, name: str) -> None:
     """L = ρ E / π at the points of matte surfaces that rays from the camera hit."""

@@ -152,6 +152,7 @@ def test_all_integrators_have_the_same_coverage(device: Device, integrator: Inte
     np.testing.assert_allclose(covered(other), covered(path), atol=1e-6)
 
 
+@pytest.mark.programs
 def test_a_hidden_lamp_still_lights(device: Device) -> None:
     """Where a lamp was seen, the wall behind it is; everywhere else the image is the same to the last bit."""
     lamp = Sphere(center=(0.0, 0.0, 1.0), radius=0.3, material=LIT)
