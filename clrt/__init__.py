@@ -63,6 +63,7 @@ if TYPE_CHECKING:
         Mirror as Mirror,
         Phong as Phong,
         Plastic as Plastic,
+        Principled as Principled,
     )
     from .scene.materials.textures import Picture as Picture, Texture as Texture
     from .scene.model import (
@@ -124,6 +125,7 @@ _HOME = {
         "Mirror",
         "Phong",
         "Plastic",
+        "Principled",
     ),
     "formats.trimesh_models": ("Scene",),  # which may contain meshes of trimesh
     "scene.model": (

@@ -92,7 +92,7 @@ static Bsdf material_at(const Scene *scene, real code, real3 wo, ireal front) {
     surface.cos_o = dot3(surface.ns, wo);
     surface.coat_cos_o = dot3(surface.coat_normal, wo);
 #endif
-#if (ANISOTROPY || ANISOTROPIC_CONDUCTOR) && !COAT_NORMALS
+#if (ANISOTROPY || BRUSH) && !COAT_NORMALS
     surface.ns = vector(ZERO, ZERO, ONE);
     surface.tangent = vector(ONE, ZERO, ZERO);
     surface.handedness = ONE;

@@ -7,7 +7,7 @@
 #include "traverse/trace.cl"
 #include TEXTURE_FILES
 
-#define TANGENTS (NORMAL_MAPS || ANISOTROPY || ANISOTROPIC_CONDUCTOR)
+#define TANGENTS (NORMAL_MAPS || ANISOTROPY || BRUSH)
 
 typedef struct {
     real3 p, p_error;     // |p − exact| <= p_error by component

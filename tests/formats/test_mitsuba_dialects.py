@@ -18,7 +18,7 @@ from clrt.formats.mitsuba.environment_map import rows_at_middles, turned_map
 from clrt.formats.mitsuba.values import blackbody
 from clrt.output.images import write_image
 from clrt.scene.lights import PointLight, SpotLight
-from clrt.scene.materials.material_types import Conductor, Diffuse, MetallicRoughness, Mirror, Phong
+from clrt.scene.materials.material_types import Conductor, Diffuse, Mirror, Phong
 from clrt.scene.materials.textures import Texture
 from clrt.scene.model import Scene
 
@@ -237,7 +237,6 @@ def test_a_rotation_about_y_is_not_resampled(folder: Path) -> None:
 STAND_INS = [
     ('<bsdf type="hair"/>', "a diffuse surface"),
     ('<bsdf type="coating"><bsdf type="diffuse"/></bsdf>', "the BSDF inside"),
-    ('<bsdf type="principled"><float name="metallic" value="1"/></bsdf>', "metallic_roughness"),
     ('<bsdf type="roughplastic"><string name="distribution" value="phong"/></bsdf>', "GGX of the same alpha"),
     ('<bsdf type="twosided"><bsdf type="diffuse"/><bsdf type="diffuse"/></bsdf>', "the first is used"),
     ('<bsdf type="diffuse"><float name="shine" value="1"/></bsdf>', "ignored"),
@@ -293,16 +292,6 @@ def test_convert_writes_the_same_scene(folder: Path) -> None:
     first, second = load(folder / "a.xml"), load(folder / "a.toml")
     assert (first.meshes[0].material, first.lights) == (second.meshes[0].material, second.lights)
     np.testing.assert_array_equal(first.meshes[0].vertices, second.meshes[0].vertices)
-
-
-def test_principled_keeps_its_parameters(folder: Path) -> None:
-    text = """<shape type="sphere"><bsdf type="principled"><rgb name="base_color" value="0.1, 0.2, 0.3"/>
-        <float name="metallic" value="0.25"/><float name="roughness" value="0.4"/><float name="clearcoat" value="0.5"/>
-        </bsdf></shape>"""
-    (folder / "a.xml").write_text(f"<scene version='3.0.0'>{text}</scene>")
-    found = load(folder / "a.xml", approximate=True).spheres[0].material
-    assert isinstance(found, MetallicRoughness) and found.ior == pytest.approx(1.5)
-    assert (found.color, found.metallic, found.roughness, found.clearcoat) == ((0.1, 0.2, 0.3), 0.25, 0.4, 0.5)
 
 
 def bomb(levels: int, start: str, use: str) -> str:

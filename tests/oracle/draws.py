@@ -19,6 +19,7 @@ from clrt.scene.materials.material_types import (
     Mirror,
     Phong,
     Plastic,
+    Principled,
     SmithTerm,
 )
 from clrt.scene.materials.metallic_roughness import Coupling, Smith
@@ -185,6 +186,20 @@ def _plastic(draws: Draws) -> dict[str, Any]:
     }
 
 
+def _principled(draws: Draws) -> dict[str, Any]:
+    """Return random parameters; anisotropy needs tangents, which the oracle has not."""
+    least, most = draws.one_of(((1.05, 2.0), (0.5, 0.9)))
+    given: dict[str, Any] = {"color": draws.color(), "roughness": draws.number(SMOOTHEST)}
+    given |= {"ior": draws.between(least, most), "metallic": draws.one_of((0.0, 1.0, draws.number(0.0)))}
+    for name in ("spec_trans", "spec_tint", "flatness"):
+        given |= {name: draws.number(0.0)} if draws.chance(0.3) else {}
+    if draws.chance(0.3):
+        given |= {"sheen": draws.number(0.0), "sheen_tint": draws.number(0.0)}
+    if draws.chance(0.3):
+        given |= {"clearcoat": draws.number(0.0), "clearcoat_gloss": draws.number(0.0, 0.5)}
+    return given
+
+
 DRAWERS: dict[type[Material], Callable[[Draws], dict[str, Any]]] = {
     Diffuse: _diffuse,
     Mirror: _mirror,
@@ -194,4 +209,5 @@ DRAWERS: dict[type[Material], Callable[[Draws], dict[str, Any]]] = {
     Phong: _phong,
     BlinnPhong: _phong,
     Plastic: _plastic,
+    Principled: _principled,
 }

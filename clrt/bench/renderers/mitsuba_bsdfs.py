@@ -27,6 +27,7 @@ from ...scene.materials.material_types import (
     Mirror,
     Phong,
     Plastic,
+    Principled,
 )
 from ...scene.materials.textures import Texture, Wrap, untextured
 from ...scene.model import Mesh, Sphere
@@ -39,7 +40,7 @@ NEARLY_SMOOTH = 0.09
 #: Cut-outs are upsampled by this factor in each dimension before thresholding.
 CUTS = 4
 #: Parameters for the color of a material.
-PAINTED = ("reflectance", "color", "specular_reflectance", "specular_transmittance")
+PAINTED = ("reflectance", "color", "base_color", "specular_reflectance", "specular_transmittance")
 CHANNELS = ("red", "green", "blue", "alpha")
 
 
@@ -297,6 +298,15 @@ def _plastic(material: Plastic) -> Plugin:
     }
 
 
+def _principled(material: Principled) -> Plugin:
+    if material.anisotropic != 0:
+        raise ValueError("anisotropic surfaces, whose directions follow texture coordinates")
+    names = ["metallic", "roughness", "spec_tint", "sheen", "sheen_tint", "flatness", "clearcoat", "clearcoat_gloss"]
+    names += ["spec_trans"] if material.spec_trans != 0 else []
+    numbers = {name: number(getattr(material, name)) for name in names}
+    return {"type": "principled", "base_color": color(material.color), "eta": material.ior} | numbers
+
+
 def _rough(plugin: Plugin, material: Conductor | Dielectric) -> Plugin:
     """Add the microfacets to a plugin. Raises ValueError if Mitsuba lacks their Smith term."""
     alpha = _alpha(material.roughness)
@@ -321,4 +331,5 @@ BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {
     Phong: _phong,
     BlinnPhong: _phong,
     Plastic: _plastic,
+    Principled: _principled,
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from .bsdfs import blend, bumpmap, conductor, dielectric, diffuse, mask, normalmap, twosided
 from .materials import Convert
 from .plastics import plastic
+from .principled import principled
 from .stand_ins import STAND_INS, phong
 
 TYPES: dict[str, Convert] = {
@@ -21,6 +22,7 @@ TYPES: dict[str, Convert] = {
     "roughconductor": conductor,
     "plastic": plastic,
     "roughplastic": plastic,
+    "principled": principled,
     "phong": phong,
     **STAND_INS,
 }

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Any
 
-from ...scene.materials.material_types import Diffuse, MetallicRoughness, Phong
-from ...scene.materials.textures import Texture
+from ...scene.materials.material_types import Diffuse, Phong
 from .materials import Convert, MaterialReader, ShapeMaterial
 from .xml import Plugin
 
@@ -38,32 +36,6 @@ def nested(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     return reader.look(inner[0])
 
 
-def principled(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
-    """Replace Disney's BSDF by glTF's; anisotropy, flatness and transmission are left out."""
-    reader.notes.instead(
-        plugin,
-        f'bsdf type "{plugin.kind}" is not supported',
-        "use roughplastic or roughconductor",
-        "metallic_roughness is used, without anisotropy and transmission",
-    )
-    plugin.ignore()
-    # specular 0.5, the default, is an index of 1.5
-    amount = min(max(plugin.value("specular", float, 0.5), 0.0), 1.0)
-    ior = plugin.value("eta", float, 0.0) or 2 / (1 - sqrt(0.08 * amount)) - 1
-    gloss = reader.number(plugin, "clearcoat_gloss", 0.0)
-    return ShapeMaterial(
-        MetallicRoughness(
-            color=_color(reader, plugin),
-            metallic=reader.number(plugin, "metallic", 0.0),
-            roughness=reader.number(plugin, "roughness", 0.5),
-            ior=min(max(ior, 1.0), 4.0),
-            clearcoat=reader.number(plugin, "clearcoat", 0.0),
-            # alpha from 0.1 to 0.001
-            clearcoat_roughness=sqrt(0.1 - 0.099 * (0.5 if isinstance(gloss, Texture) else gloss)),
-        )
-    )
-
-
 def phong(reader: MaterialReader, plugin: Plugin) -> ShapeMaterial:
     """Convert Mitsuba 0.x's Phong model, which clrt has as well."""
     return ShapeMaterial(
@@ -81,7 +53,6 @@ def _color(reader: MaterialReader, plugin: Plugin) -> Any:
 
 
 STAND_INS: dict[str, Convert] = {
-    "principled": principled,
     "coating": nested,
     "roughcoating": nested,
     "mixturebsdf": nested,

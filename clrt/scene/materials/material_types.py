@@ -2,7 +2,8 @@
 
 To add one: write its kernel file, write its dataclass here and list it in MATERIALS, where the scene file, the
 validation, the packing and the tests of every BSDF find it. Field types carry their limits (limits.py), which are
-checked when a material is made, from a file or in Python. MetallicRoughness and Plastic have files of their own.
+checked when a material is made, from a file or in Python. MetallicRoughness, Plastic and Principled have
+files of their own.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from .material import MOST_IOR, Albedo as Albedo, Material as Material, Paramete
 from .metallic_roughness import ALONG_U, MetallicRoughness as MetallicRoughness
 from .plastic import Distribution, Plastic as Plastic
 from .presets import CONDUCTORS, ConductorPreset
+from .principled import Principled as Principled
 from .textures import NonNegative, Texture
 
 Index = Annotated[float, Ge(0.01), Le(100)]
@@ -46,7 +48,7 @@ class Conductor(Material):
     """
 
     kernel: ClassVar[str] = "conductor"
-    parts: ClassVar[tuple[str, ...]] = ("BECKMANN",)
+    parts: ClassVar[tuple[str, ...]] = ("BECKMANN", "BRUSH")
     preset: ConductorPreset = "gold"
     eta: tuple[Index, Index, Index] | None = None
     k: tuple[Extinction, Extinction, Extinction] | None = None
@@ -73,7 +75,7 @@ class Conductor(Material):
 
     def features(self) -> frozenset[str]:
         has = {"TINTED_CONDUCTOR": self.reflectance != WHITE, "SEPARABLE_CONDUCTOR": self.smith == "separable"}
-        has["ANISOTROPIC_CONDUCTOR"] = self.roughness_across is not None
+        has |= dict.fromkeys(("BRUSH", "ANISOTROPIC_CONDUCTOR"), self.roughness_across is not None)
         has |= dict.fromkeys(("BECKMANN", "BECKMANN_CONDUCTOR"), self.distribution == "beckmann")
         return frozenset(name for name, present in has.items() if present)
 
@@ -232,4 +234,5 @@ MATERIALS: tuple[type[Material], ...] = (
     Phong,
     BlinnPhong,
     Plastic,
+    Principled,
 )

@@ -15,6 +15,7 @@ from clrt.scene.materials.material_types import (
     Mirror,
     Phong,
     Plastic,
+    Principled,
 )
 
 from ..surface import Surface
@@ -25,6 +26,7 @@ from .metallic_roughness import CookTorrance
 from .mirror import Specular
 from .phong import BlinnGloss, PhongGloss
 from .plastic import CoatedBase
+from .principled import Lobes
 from .scattering import Scattering
 
 SCATTERINGS: dict[type[Material], Callable[[Any, Surface], Scattering]] = {
@@ -36,6 +38,7 @@ SCATTERINGS: dict[type[Material], Callable[[Any, Surface], Scattering]] = {
     Phong: PhongGloss,
     BlinnPhong: BlinnGloss,
     Plastic: CoatedBase,
+    Principled: Lobes,
 }
 
 

@@ -52,7 +52,7 @@ class PackedMaterials:
     @property
     def tangents(self) -> bool:
         """Whether materials need the tangents of surfaces."""
-        return self.normal_maps or bool(self.featured("ANISOTROPY") or self.featured("ANISOTROPIC_CONDUCTOR"))
+        return self.normal_maps or bool(self.featured("ANISOTROPY") or self.featured("BRUSH"))
 
 
 class MaterialTables:
