@@ -118,6 +118,8 @@ MITSUBA = """<scene version="3.0.0">
 <shape type="ply"><string name="filename" value="b.ply"/><bsdf type="roughconductor">
 <spectrum name="eta" value="400:0.2, 700:0.8"/><rgb name="k" value="3"/><float name="alpha" value="0.08"/></bsdf>
 </shape>
+<shape type="cube"><bsdf type="principled"><float name="specular" value="0.4"/><rgb name="base_color" value="0.9"/>
+<float name="spec_trans" value="0.5"/><texture type="checkerboard" name="roughness"/></bsdf></shape>
 <shape type="sphere"><float name="radius" value="0.5"/><bsdf type="mask"><float name="opacity" value="0.3"/>
 <bsdf type="dielectric"><string name="int_ior" value="water"/></bsdf></bsdf>
 <medium type="homogeneous" name="interior"><rgb name="sigma_t" value="1, 2, 4"/><rgb name="albedo" value="0"/></medium>

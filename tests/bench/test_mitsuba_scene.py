@@ -25,6 +25,7 @@ from clrt.scene.materials.material_types import (
     MetallicRoughness,
     Mirror,
     Phong,
+    Principled,
 )
 from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
@@ -308,6 +309,18 @@ def test_filters_reach_beyond_the_picture() -> None:
         assert (film["rfilter"], film["sample_border"]) == ({"type": name}, border)
     with pytest.raises(UsageError, match="room: .*box, tent or gaussian"):
         mitsuba_scene(Scene(render=RenderSettings(filter="blackman_harris"), name="room"))
+
+
+def test_principled_has_a_back_side_where_it_transmits() -> None:
+    plain = Principled(color=(0.1, 0.2, 0.3), metallic=0.4, ior=1.3, sheen=0.5)
+    plugin = bsdf(plain)
+    assert (plugin["type"], plugin["base_color"]["value"]) == ("principled", [0.1, 0.2, 0.3])
+    assert (plugin["metallic"], plugin["eta"], plugin["sheen"], plugin["clearcoat"]) == (0.4, 1.3, 0.5, 0)
+    assert "spec_trans" not in plugin
+    glass = mitsuba_scene(ball(replace(plain, spec_trans=0.5)))["sphere0"]["bsdf"]
+    assert glass == plugin | {"spec_trans": 0.5}, "not two-sided"
+    with pytest.raises(UsageError, match="the ball: .*anisotropic"):
+        mitsuba_scene(ball(replace(plain, anisotropic=0.5)))
 
 
 def test_every_material_is_converted_or_refused() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from clrt.bench.renderers.agreement import agreement
 from clrt.cli.bench_agree import HEAD, agreement_line
 from clrt.scene.materials.material import Material
-from clrt.scene.materials.material_types import BlinnPhong, Dielectric, Diffuse, MetallicRoughness, Phong
+from clrt.scene.materials.material_types import BlinnPhong, Dielectric, Diffuse, MetallicRoughness, Phong, Principled
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 
 SIZE, SPP, SEEDS = (64, 64), 16, 12
@@ -39,6 +39,23 @@ MATERIALS: dict[str, Material] = {
     "thin": Dielectric(ior=1.5, roughness=0.5, thin=True, color=(0.9, 0.7, 0.5)),
     "phong": Phong(color=(0.6, 0.4, 0.3), specular=(0.5, 0.4, 0.3), shininess=30),
     "blinn_phong": BlinnPhong(color=(0.6, 0.4, 0.3), specular=(0.5, 0.4, 0.3), shininess=60),
+    "principled": Principled(color=(0.8, 0.5, 0.2), metallic=0.4, roughness=0.4, spec_tint=0.5),
+    "principled, sheen": Principled(color=(0.7, 0.4, 0.3), roughness=0.7, sheen=1.0, sheen_tint=0.5, flatness=0.5),
+    "principled, clearcoat": Principled(color=(0.6, 0.2, 0.1), clearcoat=1.0, clearcoat_gloss=0.5),
+    "principled, glass": Principled(color=(0.9, 0.8, 0.6), roughness=0.4, spec_trans=1.0),
+    "principled, all": Principled(
+        color=(0.8, 0.6, 0.3),
+        metallic=0.2,
+        roughness=0.5,
+        ior=1.3,
+        spec_tint=0.3,
+        spec_trans=0.6,
+        sheen=0.5,
+        sheen_tint=0.3,
+        flatness=0.3,
+        clearcoat=0.8,
+        clearcoat_gloss=0.2,
+    ),
 }
 
 
