@@ -27,7 +27,12 @@ TEXTURED, RAISED, ABSENT = 0.25, 0.5, 0.3
 #: Probabilities that a number is the low or the high end of its range, or inside.
 PLACES = {"low": 0.15, "high": 0.2, "inside": 0.65}
 #: Ranges of moderate draws, by suffix of the field name: a single strategy hardly samples narrower lobes and lights.
-WIDE = {"roughness": (0.4, 1.0), "shininess": (0.0, 30.0), "angle_degrees": (30.0, 180.0)}
+WIDE = {
+    "roughness": (0.4, 1.0),
+    "clearcoat_gloss": (0.0, 0.2),
+    "shininess": (0.0, 30.0),
+    "angle_degrees": (30.0, 180.0),
+}
 #: Smallest texel of moderate draws, out of 255.
 DIM = 140
 #: Texels per side of a texture.
