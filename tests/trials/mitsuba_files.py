@@ -53,7 +53,8 @@ def compared(path: Path) -> str:
     scale = LONGEST / max(scene.render.size)
     size = round(scene.render.size[0] * scale), round(scene.render.size[1] * scale)
     theirs = mitsuba.load_file(str(copy))
-    integrator = mitsuba.load_dict({"type": "path", "max_depth": DEPTH, "rr_depth": 1000})
+    kind = "path" if next(tree.iter("medium"), None) is None else "volpath"
+    integrator = mitsuba.load_dict({"type": kind, "max_depth": DEPTH, "rr_depth": 1000})
     sensor = theirs.sensors()[0]
     film = mitsuba.traverse(sensor)
     film["film.size"] = [*size]
