@@ -20,10 +20,9 @@
 #define PRINCIPLED_ALPHA_MIN 1e-3f
 #define COAT_F0 0.04f
 #define COAT_SHADOWING 0.25f    // alpha of the clearcoat's G
-// Albedos of white sheen, LOW + HIGH·(1 − cos wo)², and of a clearcoat, for 1/4 of it and cos wo = 1: about, to choose lobes.
+// Approximate albedo of white sheen: LOW + HIGH·(1 − cos wo)².
 #define SHEEN_LOW 3e-4f
 #define SHEEN_HIGH 0.088f
-#define COAT_ALBEDO 0.13f
 
 // F at a microfacet: dielectric·Fresnel + mix(f0, grazing, S).
 struct principled {
@@ -151,6 +150,33 @@ static inline real reflected_share(const struct principled *m, const Facet *at) 
 #endif
 }
 
+#if PRINCIPLED_CLEARCOAT
+// Burley's GTR1: a distribution with a longer tail than GGX.
+static inline real gtr1_d(real3 h, real alpha) {
+    real a2 = alpha * alpha;
+    return (a2 - 1.0f) / (2.0f * PI * log(alpha) * (h.x * h.x + h.y * h.y + a2 * h.z * h.z));
+}
+
+// Sample D·cos h: 1 − z² = (alpha^(2(1 − u)) − alpha²)/(1 − alpha²).
+static inline real3 sample_gtr1(real alpha, real2 u) {
+    real s, c, a2 = alpha * alpha, logarithm = 2.0f * log(alpha), inverse = 1.0f / (1.0f - a2);
+    sincos_turns(u.x, &s, &c);
+    real radius = sqrt(a2 * expm1(-u.y * logarithm) * inverse);
+    real z = sqrt(maximum(-expm1((1.0f - u.y) * logarithm) * inverse, (real)(1e-30f)));
+    return vector(radius * c, radius * s, z);
+}
+
+// At normal incidence, within 3e-4.
+static inline real gtr1_albedo(const struct principled *m) { return m->coat * (0.144f - 0.13f * sqrt(m->coat_alpha)); }
+
+// f·cos wi of the clearcoat, without D.
+static inline real coat_reflectance(const struct principled *m, real3 wo, real3 wi, real weight) {
+    real f = COAT_F0 + (1.0f - COAT_F0) * weight;
+    real masking = (1.0f + ggx_lambda(wo, (real)(COAT_SHADOWING))) * (1.0f + ggx_lambda(wi, (real)(COAT_SHADOWING)));
+    return m->coat * f * wi.z / masking;
+}
+#endif
+
 // Fractions of samples given to the lobes, by estimates of their albedos.
 typedef struct { real diffuse, coat, facets; } PrincipledShares;
 
@@ -164,7 +190,7 @@ static inline PrincipledShares principled_shares(const struct principled *m, rea
     shares.diffuse += luminance(m->sheen) * (SHEEN_LOW + SHEEN_HIGH * square(1.0f - wo.z));
 #endif
 #if PRINCIPLED_CLEARCOAT
-    shares.coat = COAT_ALBEDO * m->coat * wo.z;
+    shares.coat = gtr1_albedo(m) * wo.z;
 #endif
     real sum = shares.diffuse + shares.coat + shares.facets, inverse = sum > 0.0f ? 1.0f / sum : ZERO;
     shares.diffuse *= inverse;
@@ -189,30 +215,6 @@ static inline real3 principled_matte(const struct principled *m, real3 wo, real3
 #endif
     return scale(sum, wi.z);
 }
-
-#if PRINCIPLED_CLEARCOAT
-// Burley's GTR1: a distribution with a longer tail than GGX.
-static inline real gtr1_d(real3 h, real alpha) {
-    real a2 = alpha * alpha;
-    return (a2 - 1.0f) / (2.0f * PI * log(alpha) * (h.x * h.x + h.y * h.y + a2 * h.z * h.z));
-}
-
-// Sample D·cos h: 1 − z² = (alpha^(2(1 − u)) − alpha²)/(1 − alpha²).
-static inline real3 sample_gtr1(real alpha, real2 u) {
-    real s, c, a2 = alpha * alpha, logarithm = 2.0f * log(alpha), inverse = 1.0f / (1.0f - a2);
-    sincos_turns(u.x, &s, &c);
-    real radius = sqrt(a2 * expm1(-u.y * logarithm) * inverse);
-    real z = sqrt(maximum(-expm1((1.0f - u.y) * logarithm) * inverse, (real)(1e-30f)));
-    return vector(radius * c, radius * s, z);
-}
-
-// f·cos wi of the clearcoat, without D.
-static inline real coat_reflectance(const struct principled *m, real3 wo, real3 wi, real weight) {
-    real f = COAT_F0 + (1.0f - COAT_F0) * weight;
-    real masking = (1.0f + ggx_lambda(wo, (real)(COAT_SHADOWING))) * (1.0f + ggx_lambda(wi, (real)(COAT_SHADOWING)));
-    return m->coat * f * wi.z / masking;
-}
-#endif
 
 // D·G1(wo)/cos wo of visible normals h.
 static inline real visible_facets(const struct principled *m, real3 wo, real3 h) {
@@ -322,7 +324,7 @@ static inline real3 principled_albedo(const struct principled *m) {
     sum = mad3(m->sheen, (real)(SHEEN_LOW), sum);
 #endif
 #if PRINCIPLED_CLEARCOAT
-    sum = add(sum, splat(COAT_ALBEDO * m->coat));
+    sum = add(sum, splat(gtr1_albedo(m)));
 #endif
     return vector(minimum(sum.x, ONE), minimum(sum.y, ONE), minimum(sum.z, ONE));
 }

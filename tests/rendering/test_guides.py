@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from clrt.device.open import Device
 from clrt.rendering.accumulation import per_pixel_kernel
 from clrt.rendering.accumulation.denoiser_guides import render_guides
-from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror, Principled
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 
 from .pictures import film, frame, quad, session, view_rays
@@ -33,6 +33,10 @@ FURNACE: dict[Material, float] = {
     MetallicRoughness(color=RED, metallic=0.5, roughness=0.1): 5e-4,
     MetallicRoughness(preset="diamond", color=(1.0, 1.0, 1.0), roughness=0.1): 5e-4,
     MetallicRoughness(metallic=1.0, color=(1.0, 1.0, 1.0), roughness=0.9, multiple_scattering=True): 4e-3,
+    Principled(color=RED, metallic=0.3, roughness=0.1): 1e-3,
+    Principled(color=RED, roughness=0.2, spec_tint=1.0, flatness=1.0): 1e-3,
+    Principled(color=RED, roughness=0.2, sheen=1.0, clearcoat=1.0): 1e-3,
+    Principled(color=RED, roughness=0.2, clearcoat=1.0, clearcoat_gloss=0.8): 1e-3,
 }
 
 
