@@ -26,6 +26,7 @@ from clrt.rendering.aovs import AOVS, film_aovs
 from clrt.rendering.compile.choices import OFFSETS
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.film.film import Film
+from clrt.rendering.guiding.training import Training, guided
 from clrt.scene.model import Environment, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.ray_list import Measured, RayList
 
@@ -42,6 +43,7 @@ RNG = np.random.default_rng(7)
 ORIGINS = RNG.uniform(-1, 2, (33, 3)).astype(np.float32)
 DIRECTIONS = (RNG.random((33, 3)) - ORIGINS).astype(np.float32)
 TO_WORLD = np.concatenate([np.linalg.qr(RNG.normal(size=(5, 3, 3)))[0], RNG.normal(size=(5, 3, 1))], axis=2)
+TRAINING = Training((1, 1), 24)
 Answers = dict[str, NDArray[Any]]
 
 
@@ -58,8 +60,9 @@ def scene() -> Scene:
 
 def started(device: Device, what: Scene, **chosen: Any) -> SingleDeviceAccumulation:
     """Return a session ready to render the scene. chosen: see Choices."""
-    compiled = compile_scene(what, choices(device, **chosen), device=device)
-    return SingleDeviceAccumulation(device, compiled, LaunchPlan.of(what.render, None))
+    plan = LaunchPlan.of(what.render, None)
+    compiled, *_ = guided([device], [compile_scene(what, choices(device, **chosen), device=device)], plan, TRAINING)
+    return SingleDeviceAccumulation(device, compiled, plan)
 
 
 def picture(device: Device, what: Scene, **chosen: Any) -> Answers:
@@ -160,6 +163,7 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     for settings, chosen in variants():
         yield chosen["tests"].triangle, picture(device, replace(scene(), render=settings), **chosen)
     yield "ball", picture(device, ball())
+    yield "guided", picture(device, scene(), guiding=True)
     yield "ball groups", picture(device, ball(), light_groups=True)
     yield "catching", picture(device, replace(catching(scene()), render=replace(SETTINGS, transparent=True)))
     yield from measured(device)

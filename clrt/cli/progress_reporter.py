@@ -20,6 +20,7 @@ PHASES = {
     "load": "loading the scene",
     "build": "building the BVH",
     "compile": "compiling the kernel",
+    "train": "compiling the kernels and training the guiding field",
     "render": "rendering",
     "bake": "baking",
     "write": "writing",

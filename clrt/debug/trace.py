@@ -20,6 +20,7 @@ from ..rendering.compile.choices import Choices
 from ..rendering.compile.compile_scene import DEBUG, CompiledScene, compile_scene
 from ..rendering.compile.features import WITH_LIGHT
 from ..rendering.error_estimate.adaptive_sampling import most_planned
+from ..rendering.guiding.training import guided
 from ..scene.model import RenderSettings, Scene
 from ..scene.on_ground import on_ground
 from .record import VERTEX, PathEnd, vertex_preamble
@@ -77,9 +78,9 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
     """
     settings = scene.render
     _check(settings, pixel)
-    compiled = compile_scene(on_ground(scene), choices, DEBUG, device)
-    compiled = replace(compiled, preamble=f"{compiled.preamble}\n{vertex_preamble()}")
     plan = LaunchPlan.of(settings, most_planned(settings.spp, settings.adaptive))
+    compiled, *_ = guided([device], [compile_scene(on_ground(scene), choices, DEBUG, device)], plan)
+    compiled = replace(compiled, preamble=f"{compiled.preamble}\n{vertex_preamble()}")
     launch, depth = plan.record(compiled), plan.max_depth
     launch["first_pixel"] = pixel[1] * settings.size[0] + pixel[0]
     batch = min(settings.spp, max(1, min(first_launch_samples(compiled), MOST_RECORDS // depth)))

@@ -15,6 +15,7 @@ from ..rendering.accumulation.launch_plan import LaunchPlan
 from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_pool
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
 from ..rendering.film.tiles import TILE, tiles_of
+from ..rendering.guiding.training import guided
 from ..rendering.renderer import Renderer
 from ..rendering.stop_conditions import planned_spp
 from .orders import PictureOrder
@@ -38,7 +39,7 @@ class BandRenderer(Renderer):
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
         plan, (first, end) = LaunchPlan.of(self.settings, self._planned_spp), self._band
         (width, height), columns = plan.size, tiles_of(plan.size)[1]
-        self._pool = self._pool or make_pool(self.devices, self._compiled, plan)
+        self._pool = self._pool or make_pool(self.devices, guided(self.devices, self._compiled, plan), plan)
         return MultiDeviceAccumulation(self._pool, (width, min(end * TILE, height) - first * TILE), first * columns)
 
 

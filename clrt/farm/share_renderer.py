@@ -13,6 +13,7 @@ from ..rendering.accumulation.multi_device import MultiDeviceAccumulation, make_
 from ..rendering.accumulation.work_queue import WorkPart, WorkQueue
 from ..rendering.compile.scene_compiler import SceneCompiler
 from ..rendering.film.tiles import TILE_PIXELS, scattered
+from ..rendering.guiding.training import guided
 from .orders import Order
 from .worker_devices import about, opened
 
@@ -29,8 +30,9 @@ class ShareRenderer:
         self.scene, self.selectors = order.scene, order.devices
         settings = order.scene.render
         devices = opened(order.devices)
-        compiled = SceneCompiler(devices).compile(order.scene, order.choices)
-        self._pool = make_pool(devices, compiled, LaunchPlan.of(settings, order.planned_spp))
+        plan = LaunchPlan.of(settings, order.planned_spp)
+        compiled = guided(devices, SceneCompiler(devices).compile(order.scene, order.choices), plan)
+        self._pool = make_pool(devices, compiled, plan)
         # Its film uses no memory while it is empty.
         self._picture = MultiDeviceAccumulation(self._pool, settings.size)
         self._pixel = compiled[0].pixel

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from time import perf_counter, process_time
 from typing import Any, Unpack
 
 import numpy as np
@@ -33,6 +34,7 @@ from .error_estimate.adaptive_sampling import most_planned
 from .film.backdrop import backdrop_of
 from .film.state import State as State, check_reference
 from .film.tiles import TILE, tiles_of
+from .guiding.training import guided
 from .listed_keywords import listed
 from .passes import PassLoop
 from .progress import Progress
@@ -62,7 +64,7 @@ class Renderer:
         on_phase = on_phase if on_phase is not None else lambda phase: None
         self._open(options.get("device"), on_phase, before)
         self._checkpoints, kept = open_checkpoints(checkpoints_of(options), self.scene, self.choices, self.name)
-        on_phase("compile")
+        on_phase("train" if self.choices.guiding else "compile")
         self._planned_spp = kept.planned_spp if kept else most_planned(options.get("spp"), self.settings.adaptive)
         self._progress = Progress(
             self._new_picture(before.session.scenes if before else ()),
@@ -75,6 +77,9 @@ class Renderer:
         self._asked_for: Camera | None = None
         if kept:
             self._progress.restore(kept)
+
+    #: Seconds, and those of all cores, that the guiding field was trained for; they are not part of `seconds`.
+    training_seconds = training_cpu_seconds = 0.0
 
     def _open(self, device: Selectors, on_phase: Callable[[str], None], before: Renderer | None) -> None:
         """Open the devices and compile the scene for them."""
@@ -96,7 +101,11 @@ class Renderer:
         return picture
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
-        return make_picture(self.devices, self._compiled, LaunchPlan.of(self.settings, self._planned_spp), before)
+        plan = LaunchPlan.of(self.settings, self._planned_spp)
+        start, cpu = perf_counter(), process_time()
+        self._compiled = guided(self.devices, self._compiled, plan)
+        self.training_seconds, self.training_cpu_seconds = perf_counter() - start, process_time() - cpu
+        return make_picture(self.devices, self._compiled, plan, before)
 
     @property
     def name(self) -> str:
@@ -194,7 +203,7 @@ class Renderer:
         current, file = self.session.compiled, camera_file(camera, self.settings.integrator)
         self.scene = replace(self.scene, camera=camera)
         self._compiled = [each.seen_by(camera, file) for each in self._compiled]
-        if current.seen_by(camera, file).has_text_of(current):
+        if current.seen_by(camera, file).has_text_of(current) and not self.choices.guiding:
             self.session.look(camera)
         else:
             self._progress.session = self._new_picture()

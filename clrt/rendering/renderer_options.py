@@ -58,6 +58,7 @@ class TracingOptions(TypedDict, total=False):
     builder: BuilderName | None
     layout: LayoutName | None
     tree: bool | None
+    guiding: bool
     first_hits: bool
 
 
@@ -79,7 +80,8 @@ class RendererOptions(PictureOptions, TracingOptions, CheckpointOptions, total=F
     aovs: Annotated[str | Iterable[str] | None, "Names of AOVs to render as well (docs/aovs.md)."]
     on_phase: Annotated[
         Callable[[str], None] | None,
-        'Called with "build" (packing, BVH build) and "compile" (program build, upload) as each begins.',
+        'Called with "build" (packing, BVH build) and "compile" (program build, upload), or "train" if the guiding '
+        "field is trained as well, as each begins.",
     ]
     before: Annotated[
         Renderer | None,

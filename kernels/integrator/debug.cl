@@ -87,7 +87,7 @@ static inline Hits blocker_of(const Scene *scene, const ShadowRay *ray, ireal st
 
 // Record the sampled light and its contribution.
 static inline void note_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
-                              ireal active, Sampler *sampler, VertexLanes *v) {
+                              ireal active, Sampler *sampler, VertexLanes *v GUIDING_PARAMETER) {
     Sampler again = *sampler;
     real3 n = choosing_normal(shading);
     real2 u;
@@ -95,17 +95,17 @@ static inline void note_light(const Scene *scene, const Path *path, const Surfac
     ireal light = chosen_light(scene, surface->p, n, &again, &u, &probability);
     LightSample sample = sample_of_light(scene, light, surface->p, u);
     BsdfValue bsdf = shading_eval(shading, surface, sample.wi);
-    real pdf = sample.pdf * probability;
+    real pdf = sample.pdf * probability, bsdf_pdf = guided_pdf(scene, guiding, sample.wi, bsdf.pdf);
     v->light = active ? light : (ireal)(-1);
     v->light_probability = active ? probability : ZERO;
     v->light_direction = choose(active, sample.wi, splat(ZERO));
     v->light_radiance = choose(active, sample.radiance, splat(ZERO));
     v->light_bsdf = choose(active, bsdf.value, splat(ZERO));
     v->light_pdf = active ? pdf : ZERO;
-    v->light_weight = (active & !sample.delta) ? light_sample_weight(pdf, bsdf.pdf) : ONE;
+    v->light_weight = (active & !sample.delta) ? light_sample_weight(pdf, bsdf_pdf) : ONE;
 
     ShadowRay shadow;
-    ireal sent = aim_at_light(scene, path, surface, shading, active, sampler, &shadow);
+    ireal sent = aim_at_light(scene, path, surface, shading, active, sampler, &shadow GUIDING_ARGUMENT(guiding));
     v->sent = flag(sent);
     if (!ANY(sent)) return;
     v->unshadowed = choose(sent, shadow.contribution, splat(ZERO));
@@ -119,14 +119,18 @@ static inline void note_light(const Scene *scene, const Path *path, const Surfac
 #endif
 
 // Record the sampled direction of the next segment, or why the path ends here.
-static inline ireal note_direction(Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
-                                   int max_depth, Sampler *sampler, VertexLanes *v) {
+static inline ireal note_direction(const Scene *scene, Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
+                                   int max_depth, Sampler *sampler, VertexLanes *v GUIDING_PARAMETER) {
     Sampler again = *sampler;
-    ireal goes = go_on(path, surface, shading, active, depth, max_depth, sampler);
+    ireal goes = go_on(scene, path, surface, shading, active, depth, max_depth, sampler
+                       GUIDING_ARGUMENT(guiding));
     v->end = goes ? (ireal)(END_NONE) : (ireal)(END_DEPTH);
     if (sampler->dimension == again.dimension) return goes;   // last vertex: no direction was sampled
     real2 u = next_2d(&again), choice = next_2d(&again);
-    BsdfSample sample = shading_sample(shading, surface, u, choice.x);
+#if GUIDING
+    real bsdf_pdf;
+#endif
+    BsdfSample sample = guided_sample(scene, guiding, shading, surface, u, choice.x, &bsdf_pdf);
     v->direction = choose(active, sample.wi, splat(ZERO));
     v->weight = choose(active, sample.weight, splat(ZERO));
     v->pdf = active ? sample.pdf : ZERO;
@@ -171,11 +175,13 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
         v.shading_normal = choose(hit, surface.ns, splat(ZERO));
         v.front = flag(hit & surface.front);
         if (depth < launch.max_depth && ANY(hit)) {
+            GUIDING_AT(guiding, &scene, surface)
 #if LIGHTS
-            note_light(&scene, &path, &surface, &shading, hit, &sampler, &v);
+            note_light(&scene, &path, &surface, &shading, hit, &sampler, &v GUIDING_ARGUMENT(&guiding));
             v.direct_clamp = clamp_factor(&launch, v.direct, depth + 1);
 #endif
-            active = note_direction(&path, &surface, &shading, hit, depth, launch.max_depth, &sampler, &v);
+            active = note_direction(&scene, &path, &surface, &shading, hit, depth, launch.max_depth, &sampler, &v
+                                    GUIDING_ARGUMENT(&guiding));
             v.end = hit ? v.end : (ireal)(END_ESCAPED);
         }
 #endif

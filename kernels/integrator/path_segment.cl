@@ -6,8 +6,10 @@
 #include "light/dispatch.cl"
 #include "surface/shading.cl"
 #include "visibility/interface.cl"
+#include GUIDING_FILE
 
-#define ROULETTE_DEPTH 4   // path depth from which Russian roulette may end a path
+#define ROULETTE_DEPTH 4       // path depth from which Russian roulette may end a path
+#define LEAST_SURVIVAL 0.1f    // probability with which guided paths survive it at least
 
 // State of a path whose next segment starts at `origin` in direction `wi`.
 typedef struct {
@@ -24,6 +26,13 @@ typedef struct {
 #endif
 #if CLEAR_GLASS
     ireal clear;           // whether it has only passed through smooth glass
+#endif
+#if GUIDING
+    real expected;         // luminance expected at the camera from the first vertex on, 0 before it
+#endif
+#if TRAINING
+    real bsdf_pdf;         // density of wi as sampled from the BSDF alone
+    real weight;           // luminance of the sample's weight
 #endif
 } Path;
 
@@ -43,8 +52,23 @@ static inline Path path_along(real3 eye, real3 direction) {
 #if CLEAR_GLASS
     path.clear = ALL_LANES;
 #endif
+#if GUIDING
+    path.expected = ZERO;
+#endif
+#if TRAINING
+    path.bsdf_pdf = path.weight = ONE;
+#endif
     return path;
 }
+
+// Densities of directions, and their samples: those of the BSDF, if paths are not guided.
+#if !GUIDING
+#define GUIDING_PARAMETER
+#define GUIDING_ARGUMENT(guiding)
+#define GUIDING_AT(guiding, scene, surface)
+#define guided_pdf(scene, guiding, wi, bsdf_pdf) bsdf_pdf
+#define guided_sample(scene, guiding, shading, surface, u, choice, bsdf_pdf) shading_sample(shading, surface, u, choice)
+#endif
 
 // The contribution at the camera of radiance L that arrives along the current segment.
 static inline real3 at_eye(const Path *path, real3 L) {
@@ -182,7 +206,7 @@ static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal 
 #if LIGHTS
 // 2. Next-event estimation: sample a light and the shadow ray to it. Returns the lanes that need a shadow ray.
 static inline ireal aim_at_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
-                                 ireal active, Sampler *sampler, ShadowRay *ray) {
+                                 ireal active, Sampler *sampler, ShadowRay *ray GUIDING_PARAMETER) {
     ireal number;
     LightSample light = light_sample(scene, surface->p, choosing_normal(shading), sampler, &number);
     BsdfValue bsdf = shading_eval(shading, surface, light.wi);
@@ -195,22 +219,30 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     real distance = light.infinite ? (real)(INFINITY) : length3(sub(light.target, ray->origin));
     contribution = mul(contribution, attenuated(absorption, distance));
 #endif
-    real weight = (light.delta ? ONE : light_sample_weight(light.pdf, bsdf.pdf)) / light.pdf;
+    real pdf = guided_pdf(scene, guiding, light.wi, bsdf.pdf);
+    real weight = (light.delta ? ONE : light_sample_weight(light.pdf, pdf)) / light.pdf;
     ray->contribution = at_eye(path, scale(contribution, weight));
     return useful;
 }
 
 #endif
 
-// 3. Sample the BSDF for the direction of the next segment. Returns the lanes whose paths continue: none if the next
+// 3. Sample the BSDF, or the guiding field, for the direction of the next segment. Returns the lanes whose paths continue: none if the next
 // segment is the last one and the scene has neither emitters nor an environment that it could find.
-static inline ireal go_on(Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
-                          int max_depth, Sampler *sampler) {
+static inline ireal go_on(const Scene *scene, Path *path, const Surface *surface, const Shading *shading, ireal active,
+                          int depth, int max_depth, Sampler *sampler GUIDING_PARAMETER) {
 #if !(EMITTERS || ENVIRONMENT)
     if (depth + 1 >= max_depth) return NO_LANES;
 #endif
     real2 u = next_2d(sampler), choice = next_2d(sampler);
-    BsdfSample sample = shading_sample(shading, surface, u, choice.x);
+#if GUIDING
+    real bsdf_pdf, expected = luminance(at_eye(path, splat(guiding->reflected)));
+#endif
+    BsdfSample sample = guided_sample(scene, guiding, shading, surface, u, choice.x, &bsdf_pdf);
+#if TRAINING
+    path->bsdf_pdf = bsdf_pdf;
+    path->weight = sample.pdf > 0.0f ? luminance(sample.weight) : ZERO;
+#endif
     path->wi = sample.wi;
     path->p = surface->p;
     path->n = choosing_normal(shading);
@@ -230,9 +262,18 @@ static inline ireal go_on(Path *path, const Surface *surface, const Shading *sha
     path->origin = offset_origin(surface->p, surface->p_error, surface->ng, path->wi);
 
     // 4. Russian roulette: end paths of low throughput without bias (Arvo and Kirk 1990). Survivors have a throughput
-    // of at least 1/3: in interiors the error falls by more than the time grows.
+    // of at least 1/3: in interiors the error falls by more than the time grows. Guided paths, whose throughput falls
+    // where light is strong, end by the light expected of them (Vorba and Křivánek 2016).
+#if GUIDING
+    ireal first = !(path->expected > 0.0f) & !path->specular;
+    path->expected = first ? expected : path->expected;
+#endif
     if (depth >= ROULETTE_DEPTH) {
         real survival = minimum(3.0f * largest(path->beta), ONE);
+#if GUIDING
+        ireal known = (path->expected > 0.0f) & !path->specular;
+        survival = known ? minimum(maximum(expected / path->expected, (real)(LEAST_SURVIVAL)), ONE) : survival;
+#endif
         active = active & (choice.y < survival);
         path->beta = choose(active, scale(path->beta, 1.0f / survival), path->beta);
     }

@@ -3,10 +3,16 @@
 #include "integrator/path_segment.cl"
 #include "traverse/visits.cl"
 
+// The record of a path's vertices, if it is made (guiding/record.cl).
+#if !TRAINING
+#define RECORD_PARAMETER
+#define record_vertex(record, path, surface, L, active, goes)
+#endif
+
 // The light that a path brings from its segment `depth` on, 1 being the camera ray.
 static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path path, int depth, ireal active,
                                   Sampler *sampler, ureal *rays, real3 *direct, real *removed ALPHA_PARAMETER
-                                  CATCHER_PARAMETER GROUPS_PARAMETER) {
+                                  CATCHER_PARAMETER GROUPS_PARAMETER RECORD_PARAMETER) {
     real3 L = splat(ZERO);
     for (;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
@@ -47,9 +53,11 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
 #endif
         VISIT(shading, surface.material);
         Shading shading = shading_at(scene, path.wi, &surface);
+        GUIDING_AT(guiding, scene, surface)
 #if LIGHTS
         ShadowRay shadow;
-        ireal sent = aim_at_light(scene, &path, &surface, &shading, active, sampler, &shadow);
+        ireal sent = aim_at_light(scene, &path, &surface, &shading, active, sampler, &shadow
+                                  GUIDING_ARGUMENT(&guiding));
         *rays += sent ? (ureal)(1) : (ureal)(0);
         if (ANY(sent)) {
             real3 sampled = clamped(launch, light_along(scene, &shadow, sent), depth + 1, removed);
@@ -59,7 +67,10 @@ static inline real3 light_of_path(const Scene *scene, const Launch *launch, Path
 #endif
         }
 #endif
-        active = go_on(&path, &surface, &shading, active, depth, launch->max_depth, sampler);
+        ireal goes = go_on(scene, &path, &surface, &shading, active, depth, launch->max_depth, sampler
+                           GUIDING_ARGUMENT(&guiding));
+        record_vertex(record, &path, &surface, L, active, goes);
+        active = goes;
 #endif
     }
 }

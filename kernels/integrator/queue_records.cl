@@ -9,7 +9,7 @@
 #include "integrator/path_segment.cl"
 
 #define SHADOWS (PRIMITIVES && LIGHTS)
-#if ATTENUATION
+#if ATTENUATION || GUIDING
 #define PATH_ROWS 6
 #else
 #define PATH_ROWS 5
@@ -91,8 +91,12 @@ static inline void store_path(const Queues *q, int depth, uint place, const Trav
 #else
     row[4 * q->capacity] = row_of(t->path.beta, 0.0f);
 #endif
-#if ATTENUATION
+#if ATTENUATION && GUIDING
+    row[5 * q->capacity] = row_of(t->path.absorption, t->path.expected);
+#elif ATTENUATION
     row[5 * q->capacity] = row_of(t->path.absorption, 0.0f);
+#elif GUIDING
+    row[5 * q->capacity].w = t->path.expected;
 #endif
 }
 
@@ -119,6 +123,9 @@ static inline Travel load_path(const Queues *q, int depth, uint place) {
 #endif
 #if ATTENUATION
     t.path.absorption = xyz(row[5 * q->capacity]);
+#endif
+#if GUIDING
+    t.path.expected = row[5 * q->capacity].w;
 #endif
     return t;
 }

@@ -119,10 +119,13 @@ static inline void shade_hit(const Scene *scene, const Queues *q, const Launch *
 #endif
     Shading shading = shading_at(scene, path->wi, &surface);
     Sampler sampler = slot_sampler(launch, tiles, shaded->travel.slot, shaded->travel.dimension);
+    GUIDING_AT(guiding, scene, surface)
 #if SHADOWS
-    shaded->sends = aim_at_light(scene, path, &surface, &shading, true, &sampler, &shaded->shadow);
+    shaded->sends = aim_at_light(scene, path, &surface, &shading, true, &sampler, &shaded->shadow
+                                 GUIDING_ARGUMENT(&guiding));
 #endif
-    shaded->goes = go_on(path, &surface, &shading, true, depth, launch->max_depth, &sampler);
+    shaded->goes = go_on(scene, path, &surface, &shading, true, depth, launch->max_depth, &sampler
+                         GUIDING_ARGUMENT(&guiding));
     shaded->travel.dimension = sampler.dimension;
 }
 #endif

@@ -241,13 +241,16 @@ __attribute__((noinline)) static int shade(Scene *scene, Wave *w, int count, int
 #endif
         Shading shading = shading_at(scene, path->wi, &surface);
         Sampler sampler = slot_sampler(w, a.travel.slot);
+        GUIDING_AT(guiding, scene, surface)
 #if SHADOWS
         Shadow shadow;
         shadow.slot = a.travel.slot;
-        ireal sends = aim_at_light(scene, path, &surface, &shading, active, &sampler, &shadow.ray);
+        ireal sends = aim_at_light(scene, path, &surface, &shading, active, &sampler, &shadow.ray
+                                    GUIDING_ARGUMENT(&guiding));
         if (ANY(sends)) PACK(shadow, sends, w->shadows, *sent)
 #endif
-        ireal goes = go_on(path, &surface, &shading, active, depth, w->launch->max_depth, &sampler);
+        ireal goes = go_on(scene, path, &surface, &shading, active, depth, w->launch->max_depth, &sampler
+                            GUIDING_ARGUMENT(&guiding));
         if (ANY(goes)) PACK(a.travel, goes, w->arrivals, going)
         dimension = sampler.dimension;
     }

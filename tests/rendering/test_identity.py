@@ -70,6 +70,7 @@ OTHER: dict[str, Any] = {
     "direct_light": True,
     "light_groups": True,
     "paths": "lanes",
+    "guiding": True,
     "tree": True,
     "first_hits": True,
     "triangle": "precomputed",

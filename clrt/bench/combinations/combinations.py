@@ -25,6 +25,7 @@ from ...rendering.accumulation.single_device import SingleDeviceAccumulation
 from ...rendering.compile.compile_scene import compile_scene
 from ...rendering.film.film import Film
 from ...rendering.film.group_layers import group_layers
+from ...rendering.guiding.training import Training, guided
 from ..kernel_probe import choices
 from ..renderers.agreement import block_means
 from ..significance import FAMILY, corrected, t_test
@@ -34,6 +35,8 @@ from .random_scenes import BATCH, random_scene
 
 Doubles = NDArray[np.float64]
 
+#: The training of guiding fields.
+TRAINING = Training((1, 2, 4))
 #: Side of a block in pixels.
 BLOCK = 8
 #: Differences up to this, relative to a block or to the whole image, are attributed to float32 rounding of positions.
@@ -166,10 +169,11 @@ def _layer(film: Film, groups: Sequence[str], group: str) -> Doubles:
 def _rendered(device: Device, side: Side, number: int, spp: int, seeds: Sequence[int]) -> tuple[Doubles, int]:
     """Return the same for one of the side's scenes."""
     scene = side.scenes[number]
-    chosen = replace(choices(device), light_groups=side.group is not None)
-    compiled = compile_scene(scene, chosen, device=device)
+    chosen = replace(choices(device), light_groups=side.group is not None, guiding=side.guided)
+    plan = LaunchPlan.of(scene.render, spp)
+    compiled, *_ = guided([device], [compile_scene(scene, chosen, device=device)], plan, TRAINING)
     files = {name: side.files.get(name, own) if own else own for name, own in compiled.chosen_files.items()}
-    session = SingleDeviceAccumulation(device, replace(compiled, chosen_files=files), LaunchPlan.of(scene.render, spp))
+    session = SingleDeviceAccumulation(device, replace(compiled, chosen_files=files), plan)
     rows, dropped = [], 0
     for seed in seeds:
         session.launch["seed"] = seed

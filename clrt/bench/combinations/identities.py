@@ -39,7 +39,7 @@ class Side:
     `group`.
 
     files: kernel files that replace the program's own, by their name in `#include NAME`; mirrored: left and right are
-    exchanged.
+    exchanged; guided: whether paths are guided.
     """
 
     name: str
@@ -48,6 +48,7 @@ class Side:
     scale: float = 1.0
     mirrored: bool = False
     group: str | None = None
+    guided: bool = False
 
 
 Property = Callable[[Scene, Draws], list[Side]]
@@ -137,10 +138,26 @@ def bystanders(scene: Scene, draws: Draws) -> list[Side]:
     return [Side("as it is", [scene]), Side("with others far below", [replace(scene, spheres=scene.spheres + small)])]
 
 
+def guiding(scene: Scene, draws: Draws) -> list[Side]:
+    """Guided paths have the same means as others."""
+    return [Side("as it is", [scene]), Side("guided", [scene], guided=True)]
+
+
 #: Properties by name.
 PROPERTIES: dict[str, Property] = {
     each.__name__: each
-    for each in (additivity, groups, strategies, choice, integrators, brightness, similarity, partition, bystanders)
+    for each in (
+        additivity,
+        groups,
+        strategies,
+        choice,
+        integrators,
+        brightness,
+        similarity,
+        partition,
+        bystanders,
+        guiding,
+    )
 }
 #: Properties with moderate scenes (see Draws), because one side does without a sampling strategy.
 MODERATE = {"strategies", "choice", "integrators"}

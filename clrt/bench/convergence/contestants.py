@@ -27,6 +27,7 @@ CHOICES: dict[str, dict[str, Any]] = {
 #: Configurations compared only on request. unplanned: without known `spp`, as with --time or --error.
 MORE_CHOICES: dict[str, dict[str, Any]] = {
     "clrt, adaptive": {"adaptive": True},
+    "clrt, guided": {"guiding": True},
     "clrt, lanes 8": {"lanes": 8},
     "clrt, lanes 16": {"lanes": 16},
     "clrt, paths in lanes": {"paths": "lanes"},
@@ -82,10 +83,11 @@ def peers_of(scene: Scene, file: Path | None = None) -> tuple[dict[str, Contesta
 def _render(scene: Scene, device: int, options: Mapping[str, Any], spp: int, seed: int) -> Picture:
     """Render an image, timing only the samples, not the states made at powers of two of the samples.
 
-    The states update the error estimate. Adaptive sampling depends on them, so there they are included in the time.
+    The states update the error estimate. Adaptive sampling depends on them, so there they are included in the time. So
+    is the training of guided paths.
     """
     renderer = Renderer(scene, device=device, **{"spp": spp, "seed": seed, **options})
-    seconds, cpu_seconds = 0.0, 0.0
+    seconds, cpu_seconds = renderer.training_seconds, renderer.training_cpu_seconds
     for work in (
         [partial(_passes, renderer, spp)]
         if renderer.settings.adaptive

@@ -28,10 +28,10 @@ PATH_ROWS, SHADOW_ROWS, LIGHT_WORDS = 5, 4, 3
 
 def slot_bytes(compiled: CompiledScene) -> dict[str, int]:
     """Return the bytes of a slot in each buffer, in the order of QUEUE_PARAMETERS."""
-    names = "ATTENUATION", "INSTANCES", "LIGHTS", "DIRECT_LIGHT", "CLAMP", "ALPHA", "CATCHER"
+    names = "ATTENUATION", "GUIDING", "INSTANCES", "LIGHTS", "DIRECT_LIGHT", "CLAMP", "ALPHA", "CATCHER"
     has = {name: name in compiled.features for name in names}
     return {
-        "paths": 2 * (PATH_ROWS + has["ATTENUATION"]) * ROW,
+        "paths": 2 * (PATH_ROWS + (has["ATTENUATION"] or has["GUIDING"])) * ROW,
         "hits": ROW,
         "instances": has["INSTANCES"] * WORD,
         "order": kind_count(compiled) * WORD,

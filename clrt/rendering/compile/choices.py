@@ -51,6 +51,11 @@ class Choices:
     tree: bool | None = option(
         None, "Use a BVH, or intersect every ray with all primitives (brute force); default: the faster.", (True, False)
     )
+    guiding: bool = option(
+        False,
+        "Guide paths: learn first from where light comes, and send paths there, too.",
+        (True, False),
+    )
     first_hits: bool = option(
         False,
         "Whether first hits will be requested later, as AOVs, by a denoiser or by a user: then rays are traced "

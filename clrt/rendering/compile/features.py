@@ -76,6 +76,7 @@ def features_of(packed: PackedScene, choices: Choices, loop_limit: bool) -> set[
         "CAMERA_HIDDEN": any(not user.camera_visible for user in packed.shapes.users),
         "CLAMP": bool(biased_by(scene.render)),
         "LOOP_LIMIT": loop_limit,
+        "GUIDING": "quarters" in packed.buffers,
     }
     has["CLEAR_GLASS"] = scene.render.transparent_glass and {"ALPHA", "TRANSMISSION"} <= features
     has["HORIZON"] = has["SMOOTH_NORMALS"] or has["NORMAL_MAPS"]
@@ -160,6 +161,7 @@ def files_for(packed: PackedScene, choices: Choices, features: set[str]) -> dict
         "CAMERA": [camera_file(scene.camera, integrator)],
         "SHUTTER_FILE": ["integrator/shutter.cl"] if "TIME" in features else [],
         "CAMERA_MOTION_FILE": ["camera/moving.cl"] if "CAMERA_MOTION" in features else [],
+        "GUIDING_FILE": ["guiding/mixture.cl"] if "GUIDING" in features else [],
         "FILTER": ["film/box_filter.cl" if scene.render.filter == "box" else "film/table_filter.cl"],
         "INTEGRATOR": [_integrator_file(scene)],
         "HIT_ORDER": [f"integrator/queue_{'sorted' if 'SORT_HITS' in features else 'unsorted'}.cl"],

@@ -144,6 +144,11 @@ TEXTURE = record(
     pad="2i4",
 )
 TEXEL = np.dtype([("rgba", "u4")])
+#: A node of a guiding field's spatial tree (kernels/guiding/field.cl). axis: 0 to 2, that is cut at `value`, with the
+#: first of two children; or −1 for a leaf, with the first quarter of its quadtree, and the field's share.
+SPATIAL_NODE = record(axis="i4", value="f4", child="i4", reflected="f4")
+#: A quarter of a quadtree's node: its share of the node's probability, and its own first quarter, or −1.
+QUARTER = np.dtype([("share", "f4"), ("quarters", "i4")])
 #: Linear value of an sRGB-encoded byte.
 LINEAR = np.dtype([("linear", "f4")])
 #: Denoiser guides of a pixel (kernels/aov/denoiser_guides.cl); every field not named pad is an image.
