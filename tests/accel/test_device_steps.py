@@ -19,6 +19,7 @@ from clrt.accel.wide import leaf_fields
 from clrt.device.launches.data_parallel import DataParallel
 from clrt.device.open import Device
 
+from ..covering import covering
 from .cases import SCENES, edges
 from .device_trees import Binary, binary, binary_tree, like_gpu, wide_tree
 
@@ -32,8 +33,7 @@ def test_clusters_form_a_tree_of_bounded_depth(device: Device, case: str) -> Non
     assert len(tree.rounds) <= most + 3
 
 
-@pytest.mark.parametrize("case", SCENES)
-@pytest.mark.parametrize("gpu", [False, True], ids=["alone", "together"])
+@covering("case, gpu", SCENES, [False, True])
 def test_the_last_rounds_are_those_of_many(
     device: Device, case: str, gpu: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,6 +17,7 @@ from clrt.device.open import Device
 from clrt.queries import base
 from clrt.queries.query_program import TRAVERSALS
 
+from ..covering import others
 from ..rendering.rays import grid
 
 Doubles = NDArray[np.float64]
@@ -103,6 +104,14 @@ def test_the_end_of_a_ray_is_exact(device: Device, kind: str) -> None:
     assert query.any_hit(*rays, behind).all() and not query.any_hit(*rays, before).any()
 
 
+@pytest.mark.parametrize(
+    "soup",
+    [
+        *("bvh8-single", "cwbvh-single", "packs-single"),
+        *others("bvh8-packet", "bvh8-pool", "bvh2-single", "list-single"),
+    ],
+    indirect=True,
+)
 def test_all_hits_are_those_of_brute_force(soup: clrt.RayQuery) -> None:
     t, depth = brute_force(ORIGINS.astype(np.float64), DIRECTIONS.astype(np.float64))
     clear = np.flatnonzero((np.abs(depth) > 1e-5).all(axis=1))
@@ -127,9 +136,9 @@ def test_coherent_rays_hit_the_same_by_all_traversals(device: Device) -> None:
         clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout="bvh8", traversal=traversal)
         for traversal in (*TRAVERSALS, None)
     ]
-    first, *others = [each.closest_hit(*rays) for each in queries]
+    first, *alike = [each.closest_hit(*rays) for each in queries]
     assert (first["primitive"] >= 0).mean() > 0.3
-    for hits in others:
+    for hits in alike:
         np.testing.assert_array_equal(hits, first)
     for each in queries:
         np.testing.assert_array_equal(each.any_hit(*rays), first["primitive"] >= 0)

@@ -85,6 +85,7 @@ def test_hard_shadow_of_a_sphere(device: Device) -> None:
     np.testing.assert_array_equal(found.mean, 0)
 
 
+@pytest.mark.programs
 def test_ambient_shadow_of_a_sphere(device: Device) -> None:
     """Below a constant sky, a black ball of radius r takes the fraction r²h/D³ of the light at a distance D from its
     center, at a height h."""
@@ -112,7 +113,8 @@ def test_over_the_bare_ground_it_is_the_whole_render(device: Device, material: M
     ball = replace(BALL, center=(-0.4, 0.6, 0.1), material=Diffuse(color=(0.9, 0.2, 0.1)))
     environment = Environment(color=(0.6, 0.5, 0.9))
     scene = on_ground(material, spheres=[ball], lights=[SUN], environment=environment, render={"spp": 1024})
-    whole, alone = (film(device, each, sampler="sobol") for each in (scene, replace(scene, spheres=[])))
+    below = replace(scene, spheres=[replace(ball, center=(0.0, -2.0, 0.0))])  # without another program for no spheres
+    whole, alone = (film(device, each, sampler="sobol") for each in (scene, below))
     bare, found = alone.mean, film(device, caught(scene), sampler="sobol")
     assert np.abs(whole.mean - bare).max() > 0.3 and found.mean[covered(found) < 0.9].max() > 0.01
     noise = 1e-3 + 5 * np.sqrt(2 * whole.variance)

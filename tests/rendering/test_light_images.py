@@ -54,12 +54,13 @@ def random_light(kind: type[Any], rng: np.random.Generator, **given: Any) -> Any
     return kind(**values, **given)
 
 
+@pytest.mark.parametrize("count", [8, *others(24)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_images_are_seen_from_the_light(device: Device, kind: type[Any]) -> None:
+def test_images_are_seen_from_the_light(device: Device, kind: type[Any], count: int) -> None:
     """At random points, with all mappings, angles and falloffs; under transforms, which may mirror, the light moves
     with the points."""
     rng = np.random.default_rng(KINDS.index(kind))
-    for number in range(24):
+    for number in range(count):
         given: dict[str, Any] = {}
         if kind is SpotLight:
             outer = rng.uniform(5, 80)
@@ -95,7 +96,7 @@ def test_the_top_left_pixel_is_at_the_top_left(device: Device, kind: type[Any]) 
     assert (left_top, right_top, left_low, right_low) == ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1])
 
 
-@pytest.mark.parametrize("integrator", ["path", "raster", *others("direct", "local")])
+@pytest.mark.parametrize("integrator", ["raster", *others("path", "direct", "local")])
 def test_a_screen_is_evenly_lit(device: Device, integrator: Any) -> None:
     """A white projector gives a white screen at the distance z the irradiance intensity/z², in a rectangle of the
     image's shape, and nothing around it; with an object between, its shadow."""

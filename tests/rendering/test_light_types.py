@@ -33,7 +33,7 @@ from clrt.scene.lights import (
 from clrt.scene.materials.material import Radiance
 from clrt.scene.model import Scene
 
-from ..covering import others
+from ..covering import covering
 
 SEEDS = range(4)
 #: A power of two: multiplying by it is exact, unless results leave the range of normal floats.
@@ -108,8 +108,7 @@ def test_a_light_without_strength_is_black(kind: type[Light]) -> None:
     assert not replace(light, **blue).is_black
 
 
-@pytest.mark.parametrize("kind", LIGHTS)
-@pytest.mark.parametrize("seed", [0, 1, *others(*SEEDS[2:])])
+@covering("kind, seed", LIGHTS, SEEDS)
 def test_lights_scale_with_the_scene(device: Device, kind: type[Light], seed: int) -> None:
     """In another unit of length, directions and irradiances at the same points are the same, digit by digit."""
     scene, (p, n) = Scene(lights=[random_light(kind, seed)]), points(256)
@@ -121,8 +120,7 @@ def test_lights_scale_with_the_scene(device: Device, kind: type[Light], seed: in
     np.testing.assert_allclose(other_radiance / other_pdf[:, None], radiance / pdf[:, None], rtol=1e-6)
 
 
-@pytest.mark.parametrize("kind", LIGHTS)
-@pytest.mark.parametrize("seed", [1, *others(0, *SEEDS[2:])])
+@covering("kind, seed", LIGHTS, SEEDS)
 def test_bounds_leave_out_nothing(device: Device, kind: type[Light], seed: int) -> None:
     """Where a sample of a light arrives above the horizon, the light has a positive probability beside another one."""
     light, (p, n) = random_light(kind, seed), points(4096)

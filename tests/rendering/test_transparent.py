@@ -37,12 +37,13 @@ def half_plane(slope: float, offset: float) -> Mesh:
 
 
 def shapes(**render: Any) -> Scene:
-    """Return emissive shapes, whose radiance no other light changes."""
+    """Return emissive shapes, whose radiance no other light changes, under a sky."""
     settings: dict[str, Any] = {"size": SIZE, "spp": 16, "transparent": True, **render}
     return Scene(
         meshes=[half_plane(0.3, -0.6)],
         spheres=[Sphere(center=(0.5, 0.1, 0.5), radius=0.4, material=LIT)],
         camera=ABOVE,
+        environment=Environment(color=SKY),
         render=RenderSettings(**settings),
     )
 
@@ -100,7 +101,7 @@ def test_compositing_equals_a_render_over_the_color(device: Device, color: tuple
 @pytest.mark.programs
 def test_a_backdrop_equals_an_environment(device: Device) -> None:
     """Mean, variance and error estimate are those of the rendered environment, however the color gets there."""
-    scene = opaque(shapes(), environment=Environment(color=SKY))
+    scene = opaque(shapes())
     seen, behind = (
         Renderer(each, device=device.info.index) for each in (scene, replace(scene, backdrop=Backdrop(color=SKY)))
     )
@@ -117,7 +118,6 @@ def test_the_environment_lights_what_it_does_not_show(device: Device) -> None:
         shapes(),
         meshes=[],
         spheres=[replace(balls[0], material=Diffuse(color=(1.0, 1.0, 1.0))), balls[1]],
-        environment=Environment(color=SKY),
     )
     found = film(device, scene, 32, sampler="sobol")
     np.testing.assert_allclose(found.mean, covered(found)[..., None] * SKY, rtol=1e-5, atol=1e-6)
@@ -134,7 +134,6 @@ def test_glass_lets_the_background_through(device: Device, integrator: str) -> N
         for x, thin in ((-0.75, False), (0.75, True))
     ]
     scene = replace(shapes(integrator=integrator, transparent_glass=True), meshes=[], spheres=glass)
-    scene = replace(scene, environment=Environment(color=SKY))
     found = film(device, scene, 64, sampler="sobol")
     over = found.mean + (1 - covered(found))[..., None] * SKY
     np.testing.assert_allclose(over, film(device, opaque(scene), 64, sampler="sobol").mean, atol=2e-5)
@@ -146,7 +145,7 @@ def test_glass_lets_the_background_through(device: Device, integrator: str) -> N
 
 @pytest.mark.parametrize("integrator", ["raster", *others("normals", "local", "albedo")])
 def test_all_integrators_have_the_same_coverage(device: Device, integrator: Integrator) -> None:
-    scene = replace(shapes(), environment=Environment(color=SKY), camera=Camera(position=(0.0, 1.0, 5.0)))
+    scene = replace(shapes(), camera=Camera(position=(0.0, 1.0, 5.0)))
     path = film(device, scene, 16, sampler="sobol")
     other = film(device, replace(scene, render=replace(scene.render, integrator=integrator)), 16, sampler="sobol")
     np.testing.assert_allclose(covered(other), covered(path), atol=1e-6)
@@ -157,7 +156,7 @@ def test_a_hidden_lamp_still_lights(device: Device) -> None:
     """Where a lamp was seen, the wall behind it is; everywhere else the image is the same to the last bit."""
     lamp = Sphere(center=(0.0, 0.0, 1.0), radius=0.3, material=LIT)
     wall = replace(half_plane(0.0, 99.0), material=Diffuse())
-    scene = opaque(replace(shapes(), meshes=[wall], spheres=[lamp]))
+    scene = opaque(replace(shapes(), meshes=[wall], spheres=[lamp]), environment=Environment())
     hidden = replace(lamp, material=replace(LIT, camera_visible=False))
     seen, unseen = (film(device, each, 64, sampler="sobol").mean for each in (scene, replace(scene, spheres=[hidden])))
     x, y = pixel_places(8)
@@ -201,7 +200,7 @@ def test_a_hidden_sun_still_lights(device: Device, integrator: Integrator) -> No
 @pytest.mark.combinations
 def test_coverage_in_checkpoints_and_on_several_devices(device: Device, tmp_path: Path) -> None:
     """Two workers, and a render resumed from a checkpoint, give the film of one, to the last bit."""
-    scene = replace(shapes(), environment=Environment(color=SKY))
+    scene = shapes()
     whole = Renderer(scene, device=device.info.index, aovs="direct")
     pair = Renderer(scene, device=[device.info.index] * 2, aovs="direct")
     for renderer in (whole, pair):
@@ -239,7 +238,7 @@ def test_pixels_of_a_backdrop_are_means_over_their_areas() -> None:
 def test_image_over_a_photo(device: Device) -> None:
     """The image of a backdrop is the transparent one composited over it, and is opaque; alpha stays available."""
     photo = np.random.default_rng(3).random((SIZE[1], SIZE[0], 3)).astype(np.float32)
-    scene = replace(shapes(), environment=Environment(color=SKY))
+    scene = shapes()
     transparent = clrt.render(scene, device=device.info.index)
     image = clrt.render(opaque(scene, backdrop=Backdrop(image=photo)), device=device.info.index)
     assert transparent.alpha is not None and image.alpha is not None
