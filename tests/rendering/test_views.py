@@ -120,15 +120,16 @@ def test_a_camera_that_stays_has_no_flow(device: Device) -> None:
 
 
 def test_what_cannot_be_rendered_is_named(device: Device) -> None:
-    scene = clrt.load(SCENES / "cornell.toml")
+    scene = clrt.load(SCENES / "spot.toml")
+    layers = ["position", "object"]  # the program of the tests before
     with pytest.raises(UsageError, match=r"layer 'rbg' is unknown; .* did you mean rgb\?"):
         clrt.render_views(scene, [scene.camera], ["rbg"])
     with pytest.raises(UsageError, match="no layers"):
         clrt.render_views(scene, [scene.camera], [])
     with pytest.raises(SceneError, match=r"view 1: camera: .* is not of type Camera"):
         wrong: Any = "front"
-        clrt.render_views(scene, [scene.camera, wrong], "depth", size=SIZE, device=device.info.index)
+        clrt.render_views(scene, [scene.camera, wrong], layers, size=SIZE, device=device.info.index)
     with pytest.raises(UsageError, match="equirectangular"):
         cameras = [scene.camera, replace(scene.camera, projection="equirectangular")]
-        clrt.render_views(scene, cameras, "flow", size=SIZE, device=device.info.index)
+        clrt.render_views(scene, cameras, ["flow", *layers], size=SIZE, device=device.info.index)
     assert clrt.render_views(scene, [], "depth") == {}
