@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from clrt.accel.builders import BUILDERS, midpoint, sah
 from clrt.accel.bvh import Bvh, FloatArray, half_area, join
 
+from ..covering import others
 from .cases import NASTY, grid, soup, spheres
 
 Builder = Callable[[FloatArray, FloatArray, int, int], Bvh]
@@ -65,7 +66,7 @@ def test_any_finite_boxes_give_a_sound_tree(corners: FloatArray, configuration: 
     check(BUILDERS[builder](low, high, leaf_size, pack), low, high, leaf_size)
 
 
-@pytest.mark.parametrize("triangles", [soup(60_000, 0.01), grid(316)], ids=["soup", "200 k in a plane"])
+@pytest.mark.parametrize("triangles", [soup(60_000, 0.01), *others(grid(316))], ids=["soup", "200 k in a plane"])
 def test_many_nodes_and_batches(triangles: FloatArray) -> None:
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     check(sah(low, high, 1), low, high, 1)

@@ -57,6 +57,7 @@ def of_panel(places: Doubles) -> Doubles:
     return lambert(points, np.broadcast_to((0.0, 1.0, 0.0), points.shape), corners).reshape(places.shape[:-1])
 
 
+@pytest.mark.programs
 def test_irradiance_under_a_panel_is_lamberts(device: Device) -> None:
     scene = clrt.Scene(meshes=[sheet(), panel()], environment=BLACK)
     baked = clrt.bake(scene, "sheet", size=24, spp=256, device=device.info.index)

@@ -25,7 +25,7 @@ from clrt.scene.cameras import CAMERA_TYPES, Perspective, Projection
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 
-from ..covering import others
+from ..covering import covering, others
 from .pictures import film, frame, pixel_p_values, session
 from .skies import lookup
 
@@ -71,8 +71,7 @@ def glowing(centers: Doubles, radii: Doubles) -> list[Sphere]:
     ]
 
 
-@pytest.mark.parametrize("name", CAMERAS)
-@pytest.mark.parametrize("size", [(40, 30), (21, 55)], ids=str)
+@covering("name, size", CAMERAS, [(40, 30), (21, 55)])
 def test_spheres_lie_where_they_are_seen(device: Device, name: str, size: tuple[int, int]) -> None:
     """Eight emissive spheres, smaller than a pixel, lie at pixel centres; with a lens they are in focus."""
     camera, (width, height) = CAMERAS[name], size

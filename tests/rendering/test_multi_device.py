@@ -18,7 +18,7 @@ from clrt.rendering.accumulation.multi_device import MultiDeviceAccumulation
 from clrt.rendering.accumulation.single_device import SingleDeviceAccumulation
 from clrt.rendering.renderer import Renderer
 
-from ..covering import others
+from ..covering import covering, others
 from .checkpoints import SIZE, renderer, run, same
 from .test_checkpoint import interrupt_after
 from .test_noise import room
@@ -38,9 +38,7 @@ def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("clrt.device.launches.launch.TARGET_SECONDS", 1e-9)
 
 
-@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
-@pytest.mark.parametrize("stops", [{"spp": 40}, {"error": 0.1}], ids=str)
-@pytest.mark.parametrize("count", [2, 3])
+@covering("adaptive, stops, count", [False, True], [{"spp": 40}, {"error": 0.1}], [2, 3], strength=2)
 def test_same_picture(device: Device, adaptive: bool, stops: dict[str, float], count: int) -> None:
     """Image, estimates and the stop at an error are equal bit for bit; at least two devices took part."""
     alone, together = renderer(device, adaptive=adaptive), crew(device, count, adaptive=adaptive)
@@ -70,7 +68,7 @@ def test_interrupted_it_goes_on_alone_and_together(
     assert hops > 4 and in_hand > 2 and same(at_once, running)
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", [2, *others(1)])
 def test_passes_left_after_any_launch(device: Device, small_launches: None, count: int) -> None:
     """Each sample is added once if a pass is left after any launch, including the last."""
     whole = crew(device, count).session
@@ -87,8 +85,7 @@ def test_passes_left_after_any_launch(device: Device, small_launches: None, coun
         assert session.film().pixels.tobytes() == expected
 
 
-@pytest.mark.parametrize("when", [2, 5, 9, 14])
-@pytest.mark.parametrize("where", ["begin", "ended"])
+@covering("when, where", [2, 5, 9, 14], ["begin", "ended"])
 def test_one_that_fails_is_left_out(
     device: Device,
     small_launches: None,
