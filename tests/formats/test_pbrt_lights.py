@@ -15,6 +15,7 @@ from clrt.formats.pbrt.equal_area import direction_of, looked_up, square_of
 from clrt.output.images import write_image
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 
+from ..covering import covering
 from .pbrt_files import UPRIGHT, radiance, scene
 
 
@@ -133,8 +134,7 @@ def test_a_square_map_is_interpolated_over_its_edges() -> None:
     np.testing.assert_allclose(looked_up(image, directions)[:, 0], directions @ (0.3, -0.5, 0.8), atol=0.02)
 
 
-@pytest.mark.parametrize("square", [True, False])
-@pytest.mark.parametrize("mirrored", [True, False])
+@covering("square, mirrored", [True, False], [True, False])
 def test_an_environment_map_lies_where_its_transformation_says(folder: Path, square: bool, mirrored: bool) -> None:
     """A bright spot, in light space at a known direction, is in clrt's map where the camera's image shows it."""
     towards = np.array([0.6, 0.48, 0.64])

@@ -236,17 +236,36 @@ def test_unknown_content_is_refused() -> None:
 STOP = {"error"}
 
 
-@pytest.mark.parametrize("name", [*(name for name in SETTINGS if name not in STOP), *others(*CHOICES, *TESTS)])
-def test_renderer_farm_and_report_take_every_one(device: Device, name: str) -> None:
-    """Renderer options include every one, the farm's orders map it to the same choices, and the report lists it."""
+#: Those with which scenes are rendered by default, as each has a program of its own.
+RENDERED = ("integrator", "max_depth", "transparent")
+SOME = [name for name in SETTINGS if name not in STOP]
+
+
+def options_of(device: Device, name: str) -> tuple[Scene, dict[str, Any]]:
+    """Return a scene, and options of its render with another value for one field."""
     options: dict[str, Any] = {"size": (8, 8), "device": device.info.index}
     options |= {"aovs": (BY_AOVS[name],)} if name in BY_AOVS else {name: OTHER[name]}
+    sky = clrt.Environment(color=(1.0, 1.0, 1.0))
+    return scene(meshes=[], instances=[], spheres=[], lights=[], environment=sky), options
+
+
+@pytest.mark.parametrize("name", [*SOME, *CHOICES, *TESTS])
+def test_options_and_orders_have_every_one(device: Device, name: str) -> None:
+    """Renderer options include every one, and the farm's orders map it to the same choices."""
+    content, options = options_of(device, name)
     assert options.keys() <= inspect.signature(clrt.Renderer).parameters.keys()
-    content = scene(meshes=[], instances=[], spheres=[], lights=[], environment=clrt.Environment(color=(1.0, 1.0, 1.0)))
     order, wanted = PictureOrder(content, options), changed(content.render, Choices(), name)
     assert order.choices == choices_of(options) == wanted[1]
     assert order.settled.render == settings_of(content.render, options) == replace(wanted[0], size=options["size"])
-    renderer = clrt.Renderer(content, **options)
+
+
+@pytest.mark.parametrize(
+    "name", [*RENDERED, *others(*(name for name in (*SOME, *CHOICES, *TESTS) if name not in RENDERED))]
+)
+def test_renderer_and_report_have_every_one(device: Device, name: str) -> None:
+    """Where it is no end or rounding, the report lists it."""
+    content, options = options_of(device, name)
+    renderer, order = clrt.Renderer(content, **options), PictureOrder(content, options)
     assert renderer.choices == order.choices and renderer.settings == order.settled.render
     if name not in ENDS | ROUNDING | {"size"}:
         *_, state = renderer.passes(spp=1)
