@@ -28,11 +28,12 @@ OF_MATERIALS = {f"material_{kind.__name__}": kind for kind in MATERIALS}
 
 @cache
 def all_records() -> dict[str, np.dtype[Any]]:
-    """Return RECORDS and those of materials, whose tables of energies take seconds."""
-    return RECORDS | {
-        name: records.parameter_record(material.parameters() for material in variants(kind))
-        for name, kind in OF_MATERIALS.items()
-    }
+    """Return RECORDS and those of materials: of one with each set of features, as tables of energies take time."""
+    found = dict(RECORDS)
+    for name, kind in OF_MATERIALS.items():
+        one_of_each = {frozenset(material.features()): material for material in variants(kind)}
+        found[name] = records.parameter_record(material.parameters() for material in one_of_each.values())
+    return found
 
 
 def offsets(dtype: np.dtype[Any]) -> list[int]:
