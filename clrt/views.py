@@ -68,15 +68,15 @@ def each_view(
         given["integrator"] = "normals"  # its program is that of first hits alone
     if "alpha" in names:
         given["transparent"] = True
-    poses, ahead = tee(cameras)
-    seen = _scenes(scene, poses, lit)
+    seen, ahead = tee(_scenes(scene, cameras, lit))
     if scheduler is None:
         rendered = _rendered(seen, given, lit)
     else:
         from .farm.farm_views import farm_views
 
         rendered = farm_views(scheduler, seen, given, lit)
-    for number, ((camera, following), made) in enumerate(zip(_with_next(ahead), rendered)):
+    poses = (each.camera for each in ahead)
+    for number, ((camera, following), made) in enumerate(zip(_with_next(poses), rendered)):
         if "flow" in names:
             if motion_features(replace(scene, camera=camera)):
                 raise UsageError(

@@ -86,7 +86,7 @@ def test_records_keep_the_rules(name: str) -> None:
     assert all(place % member.base.itemsize == 0 for member, place in zip(members, offsets(dtype)))
     numbers = dict.fromkeys(("EMITTER_GROUP", "FILTER", "LIGHT_PLACE", "LIGHT_PLACEMENT", "LINEAR", "MOTION_NUMBER"), 4)
     numbers["OPAQUE"] = 1
-    alone = {**numbers, "SKY_STEP": 8, "TEXEL": 4}
+    alone = {**numbers, "QUARTER": 8, "SKY_STEP": 8, "TEXEL": 4}
     assert dtype.itemsize % alone.get(name.removeprefix("records_"), 16) == 0
 
 

@@ -128,7 +128,7 @@ def test_what_cannot_be_rendered_is_named(device: Device) -> None:
         clrt.render_views(scene, [scene.camera], [])
     with pytest.raises(SceneError, match=r"view 1: camera: .* is not of type Camera"):
         wrong: Any = "front"
-        clrt.render_views(scene, [scene.camera, wrong], layers, size=SIZE, device=device.info.index)
+        clrt.render_views(scene, [scene.camera, wrong], ["flow", *layers], size=SIZE, device=device.info.index)
     with pytest.raises(UsageError, match="equirectangular"):
         cameras = [scene.camera, replace(scene.camera, projection="equirectangular")]
         clrt.render_views(scene, cameras, ["flow", *layers], size=SIZE, device=device.info.index)
