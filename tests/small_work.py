@@ -163,7 +163,7 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     for settings, chosen in variants():
         yield chosen["tests"].triangle, picture(device, replace(scene(), render=settings), **chosen)
     yield "ball", picture(device, ball())
-    yield "guided", picture(device, scene(), guiding=True)
+    yield "guided", picture(device, scene(), guiding="on")
     yield "ball groups", picture(device, ball(), light_groups=True)
     yield "catching", picture(device, replace(catching(scene()), render=replace(SETTINGS, transparent=True)))
     yield from measured(device)

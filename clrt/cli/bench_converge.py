@@ -28,6 +28,7 @@ NAMES = [
     "lanes 1",
     "bvh2",
     "adaptive",
+    "guided",
     "lanes 8",
     "lanes 16",
     "paths in lanes",

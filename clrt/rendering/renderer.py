@@ -64,7 +64,7 @@ class Renderer:
         on_phase = on_phase if on_phase is not None else lambda phase: None
         self._open(options.get("device"), on_phase, before)
         self._checkpoints, kept = open_checkpoints(checkpoints_of(options), self.scene, self.choices, self.name)
-        on_phase("train" if self.choices.guiding else "compile")
+        on_phase("train" if self.choices.guiding == "on" else "compile")
         self._planned_spp = kept.planned_spp if kept else most_planned(options.get("spp"), self.settings.adaptive)
         self._progress = Progress(
             self._new_picture(before.session.scenes if before else ()),
@@ -203,7 +203,7 @@ class Renderer:
         current, file = self.session.compiled, camera_file(camera, self.settings.integrator)
         self.scene = replace(self.scene, camera=camera)
         self._compiled = [each.seen_by(camera, file) for each in self._compiled]
-        if current.seen_by(camera, file).has_text_of(current) and not self.choices.guiding:
+        if current.seen_by(camera, file).has_text_of(current) and self.choices.guiding == "off":
             self.session.look(camera)
         else:
             self._progress.session = self._new_picture()

@@ -14,7 +14,7 @@ from ..file_names import StrPath
 from ..scene.render_settings import Culling, Filter, Integrator, RenderSettings, Sampler
 from .aovs import chosen_aovs, needs_direct_light, needs_light_groups, seen_first
 from .checkpoint.policy import CheckpointPolicy
-from .compile.choices import Choices, Lanes, Offset
+from .compile.choices import Choices, Guiding, Lanes, Offset
 
 if TYPE_CHECKING:
     from .renderer import Renderer
@@ -58,7 +58,7 @@ class TracingOptions(TypedDict, total=False):
     builder: BuilderName | None
     layout: LayoutName | None
     tree: bool | None
-    guiding: bool
+    guiding: Guiding
     first_hits: bool
 
 

@@ -24,7 +24,8 @@ static inline Guiding guiding_at(const Scene *scene, real3 p, real3 n) {
         node = inner ? (above ? below + 1 : below) : node;
         axis = GATHER(ireal, scene->spatial_nodes, node, .axis);
     }
-    return (Guiding){GATHER(ireal, scene->spatial_nodes, node, .child), GATHER(real, scene->spatial_nodes, node, .value),
+    return (Guiding){GATHER(ireal, scene->spatial_nodes, node, .child),
+                     GATHER(real, scene->spatial_nodes, node, .value),
                      GATHER(real, scene->spatial_nodes, node, .reflected)};
 }
 
@@ -35,6 +36,11 @@ static inline real2 square_of(real3 w) {
     return (real2){minimum(x, BELOW_ONE), minimum(maximum(y, ZERO), BELOW_ONE)};
 }
 
+// The index of one of four quarters from `first` on.
+static inline ireal quarter_of(ireal first, ireal right, ireal upper) {
+    return first + (right ? (ireal)(1) : (ireal)(0)) + (upper ? (ireal)(2) : (ireal)(0));
+}
+
 // The density of a direction, per solid angle.
 static inline real guiding_pdf(const Scene *scene, const Guiding *guiding, real3 w) {
     real2 at = square_of(w);
@@ -42,7 +48,7 @@ static inline real guiding_pdf(const Scene *scene, const Guiding *guiding, real3
     ireal quarters = guiding->quarters;
     for (ireal inner = ALL_LANES; ANY(inner); inner = inner & (quarters >= 0)) {
         ireal right = at.x >= 0.5f, upper = at.y >= 0.5f;
-        ireal quarter = (inner ? quarters : (ireal)(0)) + (right ? (ireal)(1) : (ireal)(0)) + (upper ? (ireal)(2) : (ireal)(0));
+        ireal quarter = quarter_of(inner ? quarters : (ireal)(0), right, upper);
         density *= inner ? 4.0f * GATHER(real, scene->quarters, quarter, .share) : ONE;
         at.x = 2.0f * at.x - (right ? ONE : ZERO);
         at.y = 2.0f * at.y - (upper ? ONE : ZERO);
@@ -80,7 +86,7 @@ static inline real3 guiding_sample(const Scene *scene, const Guiding *guiding, r
         size = inner ? 0.5f * size : size;
         corner.x += inner & right ? size : ZERO;
         corner.y += inner & above ? size : ZERO;
-        ireal quarter = first + (right ? (ireal)(1) : (ireal)(0)) + (above ? (ireal)(2) : (ireal)(0));
+        ireal quarter = quarter_of(first, right, above);
         quarters = inner ? GATHER(ireal, scene->quarters, quarter, .quarters) : quarters;
     }
     real sine, cosine, y = corner.y + size * left.y, radius = 2.0f * safe_sqrt(y * (1.0f - y));

@@ -13,8 +13,8 @@ static inline real guided_pdf(const Scene *scene, const Guiding *guiding, real3 
     return bsdf_pdf + guiding->share * (guiding_pdf(scene, guiding, wi) - bsdf_pdf);
 }
 
-// Sample BSDF or field, as `choice` says, which is uniform in [0, 1). Specular directions are the BSDF's alone. *bsdf_pdf
-// is set to the BSDF's density of the direction.
+// Sample BSDF or field, as `choice` says, which is uniform in [0, 1). Specular directions are the BSDF's alone.
+// *bsdf_pdf is set to the BSDF's density of the direction.
 static inline BsdfSample guided_sample(const Scene *scene, const Guiding *guiding, const Shading *shading,
                                        const Surface *surface, real2 u, real choice, real *bsdf_pdf) {
     real share = guiding->share;

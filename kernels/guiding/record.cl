@@ -3,9 +3,9 @@
 //
 // The record is PathRecord: the luminance at the camera of all light that the path brings, and rows of VERTEX_WORDS
 // words, one per vertex: position; direction to the next vertex, as a point of the unit square in 16-bit fixed point,
-// azimuth below; luminance at the camera of the light brought so far; throughput of the direction, at the camera; density
-// with which it was sampled, and that of the BSDF alone. Light that arrives along the direction is then estimated as
-// (all light − light so far)/throughput.
+// azimuth below; luminance at the camera of the light brought so far; throughput of the direction, at the camera, or 0
+// if the path ends here; density with which it was sampled, and that of the BSDF alone; luminance of the sample's
+// weight; shading normal. Light that arrives along the direction is estimated as (all light − light so far)/throughput.
 #include "integrator/camera_rays.cl"
 #include "film/film.cl"
 #include "integrator/path_segment.cl"
@@ -71,7 +71,8 @@ kernel void record_paths(SCENE_PARAMETERS, global PathRecord *pixels, global con
     for (int g = 0; g < GROUPS; ++g) groups[g] = splat(ZERO);
 #endif
     real3 L = light_of_path(&scene, &launch, path_along(ray.origin, ray.direction), 1, active, &sampler, &rays, &direct,
-                            &removed ALPHA_ARGUMENT(&alpha) CATCHER_ARGUMENT(&caught) GROUPS_ARGUMENT(groups), &vertices);
+                            &removed ALPHA_ARGUMENT(&alpha) CATCHER_ARGUMENT(&caught) GROUPS_ARGUMENT(groups),
+                            &vertices);
     if (loops_ended(launch.width)) return;
     real all = luminance(L);
     for (int lane = 0; lane < LANES; ++lane) {

@@ -20,6 +20,7 @@ def run(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*RENDER, *options], cwd=folder, capture_output=True, text=True)
 
 
+@pytest.mark.processes
 def test_a_file_is_whole_at_any_moment(tmp_path: Path) -> None:
     """Reads the file as often as possible: every image is finite, of the whole size, and they converge."""
     name = tmp_path / "a.exr"
@@ -47,6 +48,7 @@ def test_the_final_image_is_the_same(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_image(tmp_path / "with.exr"), read_image(tmp_path / "without.exr"))
 
 
+@pytest.mark.processes
 def test_a_file_that_cannot_be_written(tmp_path: Path) -> None:
     """The folder is gone during the render: one warning, and the final image is kept elsewhere."""
     folder = tmp_path / "gone"

@@ -150,6 +150,7 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     ):
         used |= set(compile_scene(scene, Choices()).files)
     used |= set(compile_scene(everything(), Choices(light_groups=True)).files)
+    used |= set(files_of(compile_scene(everything(), Choices(guiding="on")).source_of("guiding/record.cl")))
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
     for entry in (
         "aov/denoiser_guides.cl",

@@ -82,6 +82,7 @@ def test_sizes_by_texel_on_a_globe() -> None:
     np.testing.assert_allclose(height[inner], np.pi, rtol=0.01)
 
 
+@pytest.mark.programs
 def test_an_image_that_is_repeated_in_different_sizes(folder: Path, caplog: pytest.LogCaptureFixture) -> None:
     """Refused, or replaced by the median, with a warning; so are texture coordinates of no area."""
     flat = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), uv=np.zeros((3, 2), np.float32))

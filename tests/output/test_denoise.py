@@ -104,6 +104,7 @@ def test_the_report_tells_the_bias(image: clrt.Image, converged: Floats) -> None
     assert told["device"].startswith("Open Image Denoise 2")
 
 
+@pytest.mark.programs
 def test_guides_guide(image: clrt.Image, guides: dict[str, Floats], converged: Floats) -> None:
     """Without edges in the guides, the error is larger."""
     assert image.raw is not None

@@ -157,6 +157,7 @@ def test_mirrors_are_followed(device: Device) -> None:
         assert found["albedo"].all() == found["normal"].any() == seen
 
 
+@pytest.mark.programs
 def test_glass_is_looked_through(device: Device) -> None:
     """Tinted at both faces; if more is reflected than refracted, the reflection is used."""
     glass, wall = Dielectric(color=(0.9, 0.8, 0.5)), back(Diffuse(color=RED))

@@ -89,7 +89,7 @@ def test_kernels_use_the_density_that_was_learned(
     device: Device, recorded: list[tuple[NDArray[np.void], dict[str, NDArray[np.void]]]]
 ) -> None:
     """Each direction's recorded density is the mixture's; E[1/density] over a hemisphere is 2·pi, its solid angle."""
-    renderer(device, covered_light(), guiding=True)
+    renderer(device, covered_light(), guiding="on")
     assert len(recorded) == 3
     (_, field), (vertices, _) = recorded[1:]
     random = np.random.default_rng(date.today().toordinal())
@@ -107,6 +107,7 @@ def test_kernels_use_the_density_that_was_learned(
     assert error < 0.05 and abs(found.mean() - 2 * np.pi) < 5 * error, (found.mean(), error)
 
 
+@pytest.mark.statistics
 def test_guided_images_have_the_same_mean(device: Device) -> None:
     """Over 16 seeds, by Student's t."""
     means = [
@@ -114,19 +115,20 @@ def test_guided_images_have_the_same_mean(device: Device) -> None:
             run(renderer(device, covered_light(), guiding=guiding, seed=seed, spp=32), spp=32).pixels.mean()
             for seed in range(16)
         ]
-        for guiding in (False, True)
+        for guiding in ("off", "on")
     ]
     difference = np.array(means[0]) - np.array(means[1])
     assert t_test(difference.mean() / (difference.std(ddof=1) / 4), 15) > 1e-4, means
 
 
+@pytest.mark.statistics
 def test_guided_images_have_less_noise(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """Pixels of 64 samples differ from a reference by a third of what they do without, once a field is well trained."""
     monkeypatch.setattr(training, "FULL", Training((1, 2, 4, 8, 16), 128 * 128))
-    reference = run(renderer(device, covered_light(), guiding=True, seed=2, spp=1024), spp=1024).pixels
+    reference = run(renderer(device, covered_light(), guiding="on", seed=2, spp=1024), spp=1024).pixels
     errors = [
         relmse(run(renderer(device, covered_light(), guiding=guiding, spp=64), spp=64).pixels, reference) or 1.0
-        for guiding in (False, True)
+        for guiding in ("off", "on")
     ]
     assert errors[1] < errors[0] / 3, errors
 
@@ -138,7 +140,7 @@ def test_a_white_furnace_stays_white(device: Device) -> None:
         environment=Environment(color=(1.0, 1.0, 1.0)),
         camera=Camera(position=(0, 3, 5), look_at=(0, 0, 0)),
     )
-    pixels = run(renderer(device, scene, guiding=True, spp=256), spp=256).pixels.astype(float)
+    pixels = run(renderer(device, scene, guiding="on", spp=256), spp=256).pixels.astype(float)
     assert abs(pixels.mean() - 1) < 5 * pixels.mean(axis=2).std() / np.sqrt(pixels[..., 0].size)
 
 
@@ -146,27 +148,27 @@ def test_a_white_furnace_stays_white(device: Device) -> None:
 def test_executions_give_the_same_image(device: Device, lanes: int, paths: str) -> None:
     """Bit for bit that of the megakernel."""
     images = [
-        run(renderer(device, covered_light(), guiding=True, lanes=lanes, paths=each), spp=24).pixels
+        run(renderer(device, covered_light(), guiding="on", lanes=lanes, paths=each), spp=24).pixels
         for each in ("lanes", paths)
     ]
     np.testing.assert_array_equal(images[0], images[1])
 
 
 def test_several_devices_give_the_same_image(device: Device) -> None:
-    alone = renderer(device, covered_light(), guiding=True)
-    together = Renderer(covered_light(), device=[device.info.index] * 2, size=SIZE, seed=1, spp=24, guiding=True)
+    alone = renderer(device, covered_light(), guiding="on")
+    together = Renderer(covered_light(), device=[device.info.index] * 2, size=SIZE, seed=1, spp=24, guiding="on")
     run(alone, spp=24)
     run(together, spp=24)
     assert same(alone, together)
 
 
 def test_a_checkpoint_resumes_to_the_same_image(device: Device, tmp_path: Path) -> None:
-    at_once = renderer(device, covered_light(), guiding=True)
+    at_once = renderer(device, covered_light(), guiding="on")
     run(at_once, spp=24)
     file = tmp_path / "guided.ckpt"
-    interrupted = renderer(device, covered_light(), guiding=True, checkpoint=file)
+    interrupted = renderer(device, covered_light(), guiding="on", checkpoint=file)
     interrupt_after(interrupted, 7)
-    resumed = renderer(device, covered_light(), guiding=True, checkpoint=file, resume=True)
+    resumed = renderer(device, covered_light(), guiding="on", checkpoint=file, resume=True)
     run(resumed, spp=24)
     assert same(at_once, resumed)
 
@@ -175,9 +177,9 @@ def test_another_view_is_that_of_a_new_renderer(device: Device) -> None:
     """Paths from another camera train another field."""
     seen = covered_light()
     other = Camera(position=(-1.9, 0, 1.9), look_at=(0, -0.5, 0), fov_degrees=70)
-    moved = renderer(device, seen, guiding=True)
+    moved = renderer(device, seen, guiding="on")
     moved.look(other)
-    fresh = renderer(device, Scene(meshes=seen.meshes, camera=other), guiding=True)
+    fresh = renderer(device, Scene(meshes=seen.meshes, camera=other), guiding="on")
     run(moved, spp=8)
     run(fresh, spp=8)
     assert same(moved, fresh)
@@ -212,7 +214,7 @@ def test_leaves_of_spatial_trees(device: Device) -> None:
 def test_scenes_without_light_or_surfaces(device: Device) -> None:
     """Nothing to learn, and nothing to guide: the images are those without."""
     for scene in (Scene(meshes=[box(2.0, WHITE)]), Scene(environment=Environment(color=(0.5, 0.5, 0.5)))):
-        images = [run(renderer(device, scene, guiding=guiding, spp=4), spp=4).pixels for guiding in (False, True)]
+        images = [run(renderer(device, scene, guiding=guiding, spp=4), spp=4).pixels for guiding in ("off", "on")]
         np.testing.assert_array_equal(images[0], images[1])
 
 

@@ -70,7 +70,7 @@ OTHER: dict[str, Any] = {
     "direct_light": True,
     "light_groups": True,
     "paths": "lanes",
-    "guiding": True,
+    "guiding": "on",
     "tree": True,
     "first_hits": True,
     "triangle": "precomputed",

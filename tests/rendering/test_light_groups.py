@@ -343,6 +343,7 @@ def test_several_devices_store_the_same_groups(device: Device) -> None:
         np.testing.assert_array_equal(two[name], layer)
 
 
+@pytest.mark.programs
 def test_views_have_a_layer_of_each_group() -> None:
     scene = lamp_and_mirror()
     views = clrt.render_views(scene, [scene.camera], ["rgb", "light_groups", "depth"])

@@ -256,6 +256,7 @@ def test_a_ground_at_any_height_hides_half_of_the_sky(device: Device, height: fl
     np.testing.assert_allclose(occlusion.value, [0, 0.5], atol=0.02)
 
 
+@pytest.mark.programs
 def test_moving_lights_are_measured_over_the_exposure(device: Device) -> None:
     corner, e1, e2 = np.array([-0.5, 3.0, -0.5]), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
     end = np.eye(3, 4)

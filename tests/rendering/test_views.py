@@ -58,6 +58,7 @@ def test_without_light_the_layers_are_the_same(device: Device) -> None:
         np.testing.assert_array_equal(unlit[name], lit[name])
 
 
+@pytest.mark.programs
 def test_a_ground_is_the_last_object_with_light_and_without(device: Device, tmp_path: Path) -> None:
     """The numbers of instances and spheres are theirs, whatever the ground; annotations leave it out."""
     cube = clrt.load(SCENES / "models" / "spot.obj").meshes[0]

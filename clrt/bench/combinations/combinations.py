@@ -169,7 +169,7 @@ def _layer(film: Film, groups: Sequence[str], group: str) -> Doubles:
 def _rendered(device: Device, side: Side, number: int, spp: int, seeds: Sequence[int]) -> tuple[Doubles, int]:
     """Return the same for one of the side's scenes."""
     scene = side.scenes[number]
-    chosen = replace(choices(device), light_groups=side.group is not None, guiding=side.guided)
+    chosen = replace(choices(device), light_groups=side.group is not None, guiding="on" if side.guided else "off")
     plan = LaunchPlan.of(scene.render, spp)
     compiled, *_ = guided([device], [compile_scene(scene, chosen, device=device)], plan, TRAINING)
     files = {name: side.files.get(name, own) if own else own for name, own in compiled.chosen_files.items()}

@@ -27,7 +27,7 @@ CHOICES: dict[str, dict[str, Any]] = {
 #: Configurations compared only on request. unplanned: without known `spp`, as with --time or --error.
 MORE_CHOICES: dict[str, dict[str, Any]] = {
     "clrt, adaptive": {"adaptive": True},
-    "clrt, guided": {"guiding": True},
+    "clrt, guided": {"guiding": "on"},
     "clrt, lanes 8": {"lanes": 8},
     "clrt, lanes 16": {"lanes": 16},
     "clrt, paths in lanes": {"paths": "lanes"},

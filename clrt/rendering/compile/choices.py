@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 Lanes = Literal[1, 8, 16]
 Offset = Literal["bound", "ulp", "fixed"]
+Guiding = Literal["off", "on"]
 #: SIMD widths: paths per work-item; and the one that the wavefront needs.
 LANES, WAVE_LANES = get_args(Lanes), 8
 #: The SIMD width that an execution of paths needs.
@@ -51,10 +52,8 @@ class Choices:
     tree: bool | None = option(
         None, "Use a BVH, or intersect every ray with all primitives (brute force); default: the faster.", (True, False)
     )
-    guiding: bool = option(
-        False,
-        "Guide paths: learn first from where light comes, and send paths there, too.",
-        (True, False),
+    guiding: str = option(
+        "off", "Learn first where light comes from, and send paths there, too (docs/guiding.md).", get_args(Guiding)
     )
     first_hits: bool = option(
         False,

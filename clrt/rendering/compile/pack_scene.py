@@ -167,7 +167,7 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: R
     if materials.with_value("opacity") or "CATCHER" in film:
         lights = np.concatenate([emitters.triangle, emitters.sphere])
         buffers["opaque"] = ("Opaque", opaque_records(shapes.scene, shapes.users, shapes.placements, lights))
-    if choices.guiding and _guides(scene, shapes):
+    if choices.guiding == "on" and _guides(scene, shapes):
         buffers |= UNTRAINED
     if groups:
         buffers |= pack_emitter_groups(shapes.scene, emitters, groups)
