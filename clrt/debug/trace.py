@@ -79,7 +79,10 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
     settings = scene.render
     _check(settings, pixel)
     plan = LaunchPlan.of(settings, most_planned(settings.spp, settings.adaptive))
-    compiled, *_ = guided([device], [compile_scene(on_ground(scene), choices, DEBUG, device)], plan)
+    compiled = compile_scene(on_ground(scene), choices, DEBUG, device)
+    if choices.guiding == "on":
+        rendered, *_ = guided([device], [compile_scene(on_ground(scene), choices, device=device)], plan)
+        compiled = replace(compiled, buffers=rendered.buffers)
     compiled = replace(compiled, preamble=f"{compiled.preamble}\n{vertex_preamble()}")
     launch, depth = plan.record(compiled), plan.max_depth
     launch["first_pixel"] = pixel[1] * settings.size[0] + pixel[0]

@@ -18,7 +18,9 @@ from clrt.device.programs import program
 from clrt.errors import DeviceError, UsageError
 from clrt.formats.load_scene import load
 from clrt.rendering.accumulation import checked_loops
-from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.choices import Choices, Guiding
+from clrt.rendering.guiding import training
+from clrt.rendering.guiding.training import Training
 from clrt.rendering.renderer import Renderer
 from clrt.scene.geometry import instancing
 from clrt.scene.materials.material_types import Diffuse
@@ -59,6 +61,7 @@ PARTS_OF_SUBJECTS: dict[str, Callable[[], Scene]] = {
     "clamped": lambda: biased(everything()),
     "glass": gallery("glass"),
     "night": gallery("night"),
+    "guided": everything,
 }
 
 
@@ -72,10 +75,12 @@ def traced(request: pytest.FixtureRequest, device: Device) -> tuple[Doubles, lis
     """Return the mean of a render of a subject, and the paths of some of its pixels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(instancing, "FEW_TRIANGLES", 0)
+        patch.setattr(training, "FULL", Training((1, 2), 1024))
         scene = (SUBJECTS | PARTS_OF_SUBJECTS)[request.param]()
-        renderer = Renderer(scene, device=device, size=SIZE, spp=SPP, max_depth=7, seed=5)
+        guiding: Guiding = "on" if request.param == "guided" else "off"
+        renderer = Renderer(scene, device=device, size=SIZE, spp=SPP, max_depth=7, seed=5, guiding=guiding)
         *_, state = renderer.passes(spp=SPP)
-        paths = [trace_pixel(renderer.scene, device, pixel) for pixel in pixels(3, 12)]
+        paths = [trace_pixel(renderer.scene, device, pixel, Choices(guiding=guiding)) for pixel in pixels(3, 12)]
     return state.film.mean, paths
 
 
