@@ -87,14 +87,6 @@ def at_pass(running: Renderer, number: int, event: Callable[[], Any], **stops: f
     assert passes > number
 
 
-def test_guided_paths_give_the_same_picture(cluster: Cluster, small_tasks: None) -> None:
-    """Each worker trains the same field."""
-    one, other = alone(room(), guiding="on"), together(cluster, room(), guiding="on")
-    run(one, spp=24)
-    run(other, spp=24)
-    assert same(one, other)
-
-
 @pytest.mark.parametrize(
     "scene",
     [

@@ -12,8 +12,12 @@ from numpy.typing import NDArray
 
 from clrt.bench.significance import t_test
 from clrt.device.open import Device
+from clrt.farm.orders import Order
+from clrt.farm.share_renderer import ShareRenderer
 from clrt.output.image_error import relmse
+from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.records import QUARTER, SPATIAL_NODE
+from clrt.rendering.film.tiles import row_by_row
 from clrt.rendering.guiding import training
 from clrt.rendering.guiding.learned_field import learned_field
 from clrt.rendering.guiding.quadtrees import DEPTH, UNIFORM, morton_codes, quadtrees
@@ -160,6 +164,15 @@ def test_several_devices_give_the_same_image(device: Device) -> None:
     run(alone, spp=24)
     run(together, spp=24)
     assert same(alone, together)
+
+
+def test_a_farms_worker_renders_the_same_samples(device: Device) -> None:
+    """It trains the same field itself."""
+    alone = renderer(device, covered_light(), guiding="on")
+    run(alone, spp=4)
+    worker = ShareRenderer(Order(alone.scene, Choices(guiding="on"), 24, (device.info.index,)))
+    share = worker.share(np.arange(alone.session.tile_samples.size, dtype=np.uint32), 0, 4, None)
+    np.testing.assert_array_equal(row_by_row(share, SIZE)["sum"], alone.session.film().pixels["sum"])
 
 
 def test_a_checkpoint_resumes_to_the_same_image(device: Device, tmp_path: Path) -> None:
