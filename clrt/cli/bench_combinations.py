@@ -25,6 +25,7 @@ PROPERTIES = (
     "similarity",
     "partition",
     "bystanders",
+    "guiding",
 )
 HEADER = (
     f"{'':16}{'scenes':>8}{'off':>6}{'2 rounds':>10}{'3 rounds':>10}{'4 rounds':>10}{'least p':>10}{'noise':>9}"
