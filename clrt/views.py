@@ -65,7 +65,7 @@ def each_view(
     given = cast(RendererOptions, {**options, "aovs": list(aovs)})
     lit = not {"rgb", "alpha"}.isdisjoint(names) or not set(aovs).isdisjoint(aovs_from("film"))
     if not lit:
-        given["integrator"] = "normals"  # its program is that of first hits alone
+        given["integrator"], given["guiding"] = "normals", "off"  # its program is that of first hits alone
     if "alpha" in names:
         given["transparent"] = True
     seen, ahead = tee(_scenes(scene, cameras, lit))

@@ -27,7 +27,7 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
         "view": renderer.scene.display.view,
         **{name: value for name, value in values_of(settings, renderer.choices).items() if name != "size"},
         "seconds": renderer.seconds,
-        **({"training_seconds": renderer.training_seconds} if renderer.choices.guiding == "on" else {}),
+        **({"training_seconds": renderer.training_seconds} if renderer.training_seconds else {}),
         "samples": samples,
         "samples_per_second": samples / seconds,
         "rays": state.film.rays,

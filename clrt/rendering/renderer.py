@@ -52,6 +52,9 @@ class Renderer:
     these options; scene: the same on its ground, as it is rendered.
     """
 
+    #: Seconds, and those of all cores, that the guiding field was trained for; they are not part of `seconds`.
+    training_seconds = training_cpu_seconds = 0.0
+
     @with_default_errors
     def __init__(self, scene: Scene, **options: Unpack[RendererOptions]) -> None:
         check_stops(options.get("spp"))
@@ -78,9 +81,6 @@ class Renderer:
         if kept:
             self._progress.restore(kept)
 
-    #: Seconds, and those of all cores, that the guiding field was trained for; they are not part of `seconds`.
-    training_seconds = training_cpu_seconds = 0.0
-
     def _open(self, device: Selectors, on_phase: Callable[[str], None], before: Renderer | None) -> None:
         """Open the devices and compile the scene for them."""
         self.device, *_ = self.devices = open_devices(device)
@@ -102,10 +102,14 @@ class Renderer:
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
         plan = LaunchPlan.of(self.settings, self._planned_spp)
+        if self.choices.guiding == "on":
+            self._train(plan)
+        return make_picture(self.devices, self._compiled, plan, before)
+
+    def _train(self, plan: LaunchPlan) -> None:
         start, cpu = perf_counter(), process_time()
         self._compiled = guided(self.devices, self._compiled, plan)
         self.training_seconds, self.training_cpu_seconds = perf_counter() - start, process_time() - cpu
-        return make_picture(self.devices, self._compiled, plan, before)
 
     @property
     def name(self) -> str:

@@ -1,13 +1,13 @@
 // Path guiding: a field of directional distributions, learned from paths before the image is rendered, from which the
 // directions of paths are sampled besides those from BSDFs (Müller, Gross and Novák 2017). World frame.
 //
-// A binary tree over space has a quadtree over directions in each of its leaves. Directions are points of the unit
-// square, with areas in proportion to solid angles: (azimuth/2·pi, (1 + z)/2). A quadtree divides the square into
-// quarters, each with its share of the square's probability; a quarter that is not divided further has a constant
-// density. Points of space have no frame, so the field ignores surfaces: the BSDF's samples see to those.
+// A binary tree over positions and shading normals has a quadtree over directions in each of its leaves. Directions are
+// points of the unit square, with areas in proportion to solid angles: (azimuth/2·pi, (1 + z)/2). A quadtree divides the
+// square into quarters, each with its share of the square's probability; a quarter that is not divided further has a
+// constant density.
 #include "core/sampling.cl"
 
-// The field at a point. quarters: the index of the root's first quarter; share: the share of directions sampled from
+// The field at a point of a surface. quarters: the index of the root's first quarter; share: the share of directions sampled from
 // the field; reflected: the mean luminance that surfaces here reflect, without that of light sampling.
 typedef struct {
     ireal quarters;

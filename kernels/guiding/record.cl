@@ -1,8 +1,8 @@
 // Training of a guiding field: paths through each pixel, with the vertices at which a direction was sampled from BSDF
 // or field. A work-item takes LANES pixels and traces one path through each.
 //
-// The record is PathRecord: the luminance at the camera of all light that the path brings, and rows of VERTEX_WORDS
-// words, one per vertex: position; direction to the next vertex, as a point of the unit square in 16-bit fixed point,
+// The record is PathRecord: the luminance at the camera of all light that the path brings, and rows of words, one per
+// vertex: position; direction to the next vertex, as a point of the unit square in 16-bit fixed point,
 // azimuth below; luminance at the camera of the light brought so far; throughput of the direction, at the camera, or 0
 // if the path ends here; density with which it was sampled, and that of the BSDF alone; luminance of the sample's
 // weight; shading normal. Light that arrives along the direction is estimated as (all light − light so far)/throughput.
@@ -10,14 +10,16 @@
 #include "film/film.cl"
 #include "integrator/path_segment.cl"
 
+// Where lanes record their paths, and how many vertices they have recorded.
 typedef struct {
-    float words[LANES][VERTICES][VERTEX_WORDS];
+    global PathRecord *pixels;
+    ureal index;
     int count[LANES];
-} Vertices;
+} Record;
 
-#define RECORD_PARAMETER , Vertices *record
+#define RECORD_PARAMETER , Record *record
 
-static inline void record_vertex(Vertices *record, const Path *path, const Surface *surface, real3 L, ireal active,
+static inline void record_vertex(Record *record, const Path *path, const Surface *surface, real3 L, ireal active,
                                  ireal goes) {
     ireal recorded = active & !path->specular;
     real2 at = square_of(path->wi);
@@ -27,7 +29,7 @@ static inline void record_vertex(Vertices *record, const Path *path, const Surfa
         int place = record->count[lane];
         if (!LANE_INT(recorded, lane) || place == VERTICES) continue;
         record->count[lane] = place + 1;
-        float *words = record->words[lane][place];
+        global float *words = record->pixels[LANE_UINT(record->index, lane)].vertices[place];
         words[0] = LANE(surface->p.x, lane);
         words[1] = LANE(surface->p.y, lane);
         words[2] = LANE(surface->p.z, lane);
@@ -55,8 +57,8 @@ kernel void record_paths(SCENE_PARAMETERS, global PathRecord *pixels, global con
     SET_TIME(scene, launch, sampler, own.y)
     CameraRay ray;
     ireal active = own.inside & camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler, &ray);
-    Vertices vertices;
-    for (int lane = 0; lane < LANES; ++lane) vertices.count[lane] = 0;
+    Record record = {pixels, own.index};
+    for (int lane = 0; lane < LANES; ++lane) record.count[lane] = 0;
     real3 direct;
     real removed = ZERO;
     ureal rays = (ureal)(0);
@@ -72,16 +74,13 @@ kernel void record_paths(SCENE_PARAMETERS, global PathRecord *pixels, global con
 #endif
     real3 L = light_of_path(&scene, &launch, path_along(ray.origin, ray.direction), 1, active, &sampler, &rays, &direct,
                             &removed ALPHA_ARGUMENT(&alpha) CATCHER_ARGUMENT(&caught) GROUPS_ARGUMENT(groups),
-                            &vertices);
+                            &record);
     if (loops_ended(launch.width)) return;
     real all = luminance(L);
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(own.inside, lane)) continue;
         global PathRecord *pixel = pixels + LANE_UINT(own.index, lane);
         pixel->light = LANE(all, lane);
-        pixel->count = vertices.count[lane];
-        for (int i = 0; i < vertices.count[lane]; ++i) {
-            for (int k = 0; k < VERTEX_WORDS; ++k) pixel->vertices[i][k] = vertices.words[lane][i][k];
-        }
+        pixel->count = record.count[lane];
     }
 }

@@ -119,11 +119,11 @@ static inline void note_light(const Scene *scene, const Path *path, const Surfac
 #endif
 
 // Record the sampled direction of the next segment, or why the path ends here.
-static inline ireal note_direction(const Scene *scene, Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
-                                   int max_depth, Sampler *sampler, VertexLanes *v GUIDING_PARAMETER) {
+static inline ireal note_direction(const Scene *scene, Path *path, const Surface *surface, const Shading *shading,
+                                   ireal active, int depth, int max_depth, Sampler *sampler,
+                                   VertexLanes *v GUIDING_PARAMETER) {
     Sampler again = *sampler;
-    ireal goes = go_on(scene, path, surface, shading, active, depth, max_depth, sampler
-                       GUIDING_ARGUMENT(guiding));
+    ireal goes = go_on(scene, path, surface, shading, active, depth, max_depth, sampler GUIDING_ARGUMENT(guiding));
     v->end = goes ? (ireal)(END_NONE) : (ireal)(END_DEPTH);
     if (sampler->dimension == again.dimension) return goes;   // last vertex: no direction was sampled
     real2 u = next_2d(&again), choice = next_2d(&again);

@@ -227,8 +227,9 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
 
 #endif
 
-// 3. Sample the BSDF, or the guiding field, for the direction of the next segment. Returns the lanes whose paths continue: none if the next
-// segment is the last one and the scene has neither emitters nor an environment that it could find.
+// 3. Sample the BSDF, or the guiding field, for the direction of the next segment. Returns the lanes whose paths
+// continue: none if the next segment is the last one and the scene has neither emitters nor an environment that it could
+// find.
 static inline ireal go_on(const Scene *scene, Path *path, const Surface *surface, const Shading *shading, ireal active,
                           int depth, int max_depth, Sampler *sampler GUIDING_PARAMETER) {
 #if !(EMITTERS || ENVIRONMENT)

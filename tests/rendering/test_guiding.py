@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import clrt
 from clrt.bench.significance import t_test
 from clrt.device.open import Device
+from clrt.errors import UsageError
 from clrt.farm.orders import Order
 from clrt.farm.share_renderer import ShareRenderer
 from clrt.output.image_error import relmse
@@ -46,7 +48,7 @@ def short_training(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def covered_light() -> Scene:
-    """Return a closed room whose lamp shines up from a box that is open at the top: all light is indirect."""
+    """Return a closed room with a lamp in a box that is open at the top: elsewhere all light is indirect."""
     lamp = quad(
         [(-0.3, -1, 0.3), (0.3, -1, 0.3), (0.3, -1, -0.3), (-0.3, -1, -0.3)], Diffuse(emission=(50.0, 50.0, 50.0))
     )
@@ -229,6 +231,16 @@ def test_scenes_without_light_or_surfaces(device: Device) -> None:
     for scene in (Scene(meshes=[box(2.0, WHITE)]), Scene(environment=Environment(color=(0.5, 0.5, 0.5)))):
         images = [run(renderer(device, scene, guiding=guiding, spp=4), spp=4).pixels for guiding in ("off", "on")]
         np.testing.assert_array_equal(images[0], images[1])
+
+
+def test_what_cannot_be_guided_is_told(device: Device) -> None:
+    for integrator in ("direct", "local", "raster", "normals"):
+        with pytest.raises(UsageError, match=f"guiding needs the integrator path, not {integrator}; leave out one"):
+            renderer(device, covered_light(), guiding="on", integrator=integrator)
+    with pytest.raises(UsageError, match="guiding needs a camera: .* leave it out"):
+        clrt.irradiance(covered_light(), [[0, 1, 0]], [[0, 1, 0]], guiding="on", device=device.info.index)
+    with pytest.raises(UsageError, match="guiding"):
+        renderer(device, covered_light(), guiding=True)
 
 
 def test_quadtrees_are_distributions(device: Device) -> None:

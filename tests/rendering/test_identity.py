@@ -263,7 +263,7 @@ def test_options_and_orders_have_every_one(device: Device, name: str) -> None:
     "name", [*RENDERED, *others(*(name for name in (*SOME, *CHOICES, *TESTS) if name not in RENDERED))]
 )
 def test_renderer_and_report_have_every_one(device: Device, name: str) -> None:
-    """Where it is no end or rounding, the report lists it."""
+    """The report lists it, unless it only ends the image or affects rounding alone."""
     content, options = options_of(device, name)
     renderer, order = clrt.Renderer(content, **options), PictureOrder(content, options)
     assert renderer.choices == order.choices and renderer.settings == order.settled.render

@@ -19,7 +19,6 @@ from ...scene.geometry.instancing import arranged
 from ...scene.geometry.scaling import SceneFrame, frame_of, in_frame
 from ...scene.materials.material_types import Material
 from ...scene.model import Scene
-from ...scene.ray_list import RayList
 from ...threads import beside
 from .camera_kernel import camera_buffers
 from .choices import Choices
@@ -28,7 +27,7 @@ from .geometry.pack_geometry import TriangleCorners, normal_records, sphere_reco
 from .geometry.pack_instances import ObjectIds, PackedInstances
 from .geometry.pack_opaque import opaque_records
 from .geometry.vertex_attributes import pack_corners
-from .guiding_field import UNTRAINED
+from .guiding_field import UNTRAINED, check_guiding
 from .lights.emitter_groups import pack_emitter_groups
 from .lights.environment_map import EnvironmentMap
 from .lights.pack_lights import PackedLights, pack_emitters
@@ -167,16 +166,12 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: R
     if materials.with_value("opacity") or "CATCHER" in film:
         lights = np.concatenate([emitters.triangle, emitters.sphere])
         buffers["opaque"] = ("Opaque", opaque_records(shapes.scene, shapes.users, shapes.placements, lights))
-    if choices.guiding == "on" and _guides(scene, shapes):
-        buffers |= UNTRAINED
+    if choices.guiding == "on":
+        check_guiding(scene)
+        buffers |= UNTRAINED if shapes.users else {}
     if groups:
         buffers |= pack_emitter_groups(shapes.scene, emitters, groups)
     return PackedScene(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, counts, film, groups)
-
-
-def _guides(scene: Scene, shapes: Shapes) -> bool:
-    """Return whether paths go on from surfaces that a camera sees."""
-    return scene.render.integrator == "path" and not isinstance(scene.camera, RayList) and bool(shapes.users)
 
 
 def _counts(shapes: Shapes, emitters: PackedLights) -> NDArray[Any]:

@@ -144,8 +144,9 @@ TEXTURE = record(
     pad="2i4",
 )
 TEXEL = np.dtype([("rgba", "u4")])
-#: A node of a guiding field's spatial tree (kernels/guiding/field.cl). axis: 0 to 2, that is cut at `value`, with the
-#: first of two children; or −1 for a leaf, with the first quarter of its quadtree, and the field's share.
+#: A node of a guiding field's spatial tree (kernels/guiding/field.cl). axis: of the position, 0 to 2, or of the normal,
+#: 3 to 5, that is cut at `value`; child: the first of two. Of a leaf axis is −1, value the field's share, child the
+#: first quarter of its quadtree; reflected: the mean luminance reflected there, without that of light sampling.
 SPATIAL_NODE = record(axis="i4", value="f4", child="i4", reflected="f4")
 #: A quarter of a quadtree's node: its share of the node's probability, and its own first quarter, or −1.
 QUARTER = np.dtype([("share", "f4"), ("quarters", "i4")])

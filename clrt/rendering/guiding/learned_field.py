@@ -38,11 +38,11 @@ def learned_field(vertices: NDArray[Any]) -> Buffers:
     trees = quadtrees(leaves, codes, estimates, squares, count)
     share = _shares(squares, trees.density(leaves, codes), vertices["bsdf_pdf"], leaves, count)
     held = np.maximum(np.bincount(leaves, minlength=count), 1)
-    nodes, bare = tree.nodes, tree.is_leaf
-    number = nodes["child"][bare]
-    nodes["child"][bare] = 4 * number
-    nodes["value"][bare] = share[number]
-    nodes["reflected"][bare] = (np.bincount(leaves, reflected[cells], count) / held)[number]
+    nodes, is_leaf = tree.nodes, tree.is_leaf
+    number = nodes["child"][is_leaf]
+    nodes["child"][is_leaf] = 4 * number
+    nodes["value"][is_leaf] = share[number]
+    nodes["reflected"][is_leaf] = (np.bincount(leaves, reflected[cells], count) / held)[number]
     return field_buffers(nodes, trees.quarters)
 
 

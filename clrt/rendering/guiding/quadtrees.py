@@ -51,10 +51,8 @@ def _spread(values: NDArray[np.uint32]) -> NDArray[np.uint32]:
 
 
 class _Level(NamedTuple):
-    """Quarters of one size, (n, 4). light: first moments; mass: what shares are in proportion to; divided: whether they
-    are divided further."""
+    """Quarters of one size, (n, 4). mass: what shares are in proportion to; divided: whether they are divided."""
 
-    light: NDArray[np.float64]
     mass: NDArray[np.float64]
     divided: NDArray[np.bool_]
 
@@ -86,7 +84,7 @@ def quadtrees(
         found = np.diff(sums[cuts], axis=1)
         area = 0.25 ** (len(levels) + 1)
         divided = (found[..., 0] > DIVIDED * whole[:, None]) & (np.diff(cuts, axis=1) >= FEWEST) & (width > 1)
-        levels.append(_Level(found[..., 0], np.sqrt(np.maximum(found[..., 1], 0) * area), divided))
+        levels.append(_Level(np.sqrt(np.maximum(found[..., 1], 0) * area), divided))
         row, column = np.nonzero(divided)
         corners, whole = corners[row] + width * column.astype(np.uint64), whole[row]
     return Quadtrees(_quarters(levels))

@@ -52,7 +52,7 @@ def record_paths(session: LocalAccumulation, sample: int) -> NDArray[Any]:
     kind = record(light="f4", count="i4", pad="2i4", vertices=f"({count},{words})f4")
     preamble = [
         "#define TRAINING 1",
-        defines({"VERTICES": count, "VERTEX_WORDS": words}),
+        defines({"VERTICES": count}),
         typedefs({"PathRecord": kind}),
     ]
     kernel = per_pixel_kernel(

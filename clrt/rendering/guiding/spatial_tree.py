@@ -14,7 +14,7 @@ from ..compile.records import SPATIAL_NODE
 LEAF = -1
 #: A node is cut along an axis of the normal while the normals' variance along it exceeds this.
 NORMAL_VARIANCE = 0.1
-#: Vertices per leaf that a tree is built from: every so manieth of all.
+#: A tree is built from about this many vertices per leaf; the others are left out.
 BUILT_FROM = 64
 
 

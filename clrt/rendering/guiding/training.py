@@ -24,7 +24,7 @@ class Training(NamedTuple):
     pixels: int = 256 * 144
 
 
-#: Added to an image's seed: a field that were learned from the image's own samples would favor them.
+#: Added to an image's seed: learned from the image's own samples, a field would favor them, and bias it.
 OTHER_SEED = 0x9E3779B9
 #: The training of a render.
 FULL = Training()
